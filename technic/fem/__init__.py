@@ -1,0 +1,1 @@
+"""The mechanics of one part: stiffness, mass, rigid motions and port frames."""

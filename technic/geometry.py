@@ -1,0 +1,168 @@
+"""Small geometry: rigid motions of a frame and how they move between points and axes.
+
+A *twist* is a small rigid motion ``(u, theta)``: translation of a point (m) and rotation (rad), six
+numbers. A *pose* maps part coordinates to world coordinates, ``x = Q p + t``. ``Q`` is orthogonal; it
+may be a reflection (determinant -1), because LDraw files mirror parts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "Array",
+    "Pose",
+    "axes_from",
+    "nearest_orthogonal",
+    "readonly",
+    "shift_twist",
+    "skew",
+    "turn_twist",
+]
+
+Array = NDArray[np.float64]
+
+
+def readonly(values: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
+    """Return a copy of `values` as an array that refuses to be written."""
+    array = np.array(values, dtype=dtype)
+    array.setflags(write=False)
+    return array
+
+
+def skew(r: ArrayLike) -> Array:
+    """Return the matrix ``[r]x`` with ``[r]x v = r x v``.
+
+    Parameters
+    ----------
+    r : (..., 3) array_like
+
+    Returns
+    -------
+    (..., 3, 3) ndarray
+    """
+    r = np.asarray(r, dtype=float)
+    out = np.zeros((*r.shape[:-1], 3, 3))
+    out[..., 0, 1], out[..., 0, 2] = -r[..., 2], r[..., 1]
+    out[..., 1, 0], out[..., 1, 2] = r[..., 2], -r[..., 0]
+    out[..., 2, 0], out[..., 2, 1] = -r[..., 1], r[..., 0]
+    return out
+
+
+def shift_twist(arm: ArrayLike) -> Array:
+    """Return ``X`` that moves the reference point of a twist: the point at ``p + arm`` moves by
+    ``u + theta x arm``.
+
+    Parameters
+    ----------
+    arm : (..., 3) array_like
+        Vector from the old to the new reference point (m).
+
+    Returns
+    -------
+    (..., 6, 6) ndarray
+    """
+    arm = np.asarray(arm, dtype=float)
+    out = np.zeros((*arm.shape[:-1], 6, 6))
+    out[..., range(6), range(6)] = 1.0
+    out[..., :3, 3:] = -skew(arm)
+    return out
+
+
+def turn_twist(q: ArrayLike) -> Array:
+    """Return ``blockdiag(Q, det(Q) Q)``: a twist given in part axes, in world axes.
+
+    Rotations are axial vectors, hence the determinant for a mirrored part.
+
+    Parameters
+    ----------
+    q : (..., 3, 3) array_like
+        Orthogonal.
+
+    Returns
+    -------
+    (..., 6, 6) ndarray
+    """
+    q = np.asarray(q, dtype=float)
+    out = np.zeros((*q.shape[:-2], 6, 6))
+    out[..., :3, :3] = q
+    out[..., 3:, 3:] = np.sign(np.linalg.det(q))[..., None, None] * q
+    return out
+
+
+def axes_from(axis: ArrayLike) -> Array:
+    """Return a right-handed orthonormal frame whose first row is `axis`.
+
+    The other two rows depend on `axis` alone, so that results are deterministic.
+
+    Parameters
+    ----------
+    axis : (3,) array_like
+        Not zero; need not be a unit vector.
+
+    Returns
+    -------
+    (3, 3) ndarray
+        Rows: axis, first shear direction, second shear direction.
+    """
+    a = np.asarray(axis, dtype=float)
+    a = a / np.linalg.norm(a)
+    helper = np.zeros(3)
+    helper[np.argmin(np.abs(a).round(9))] = 1.0
+    b = np.cross(a, helper)
+    b /= np.linalg.norm(b)
+    return np.array([a, b, np.cross(a, b)])
+
+
+def nearest_orthogonal(matrix: ArrayLike) -> Array:
+    """Return the orthogonal matrix nearest to `matrix` (polar decomposition); reflections stay."""
+    u, _, vt = np.linalg.svd(np.asarray(matrix, dtype=float))
+    return np.asarray(u @ vt)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """Position and orientation of a part: ``x_world = rotation @ x_part + translation``.
+
+    Parameters
+    ----------
+    rotation : (3, 3) array_like
+        Orthogonal; determinant -1 for a mirrored part.
+    translation : (3,) array_like
+        In metres.
+    """
+
+    rotation: Array
+    translation: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rotation", readonly(self.rotation))
+        object.__setattr__(self, "translation", readonly(self.translation))
+        if self.rotation.shape != (3, 3) or self.translation.shape != (3,):
+            raise ValueError("a pose needs a (3, 3) rotation and a (3,) translation")
+
+    @classmethod
+    def identity(cls) -> Pose:
+        """Return the pose that moves nothing."""
+        return cls(np.eye(3), np.zeros(3))
+
+    def points(self, local: ArrayLike) -> Array:
+        """Return points given in part coordinates, (..., 3), in world coordinates."""
+        return np.asarray(local, dtype=float) @ self.rotation.T + self.translation
+
+    def directions(self, local: ArrayLike) -> Array:
+        """Return directions given in part axes, (..., 3), in world axes."""
+        return np.asarray(local, dtype=float) @ self.rotation.T
+
+    def to_local(self, world: ArrayLike) -> Array:
+        """Return points given in world coordinates, (..., 3), in part coordinates."""
+        return (np.asarray(world, dtype=float) - self.translation) @ self.rotation
+
+    def __matmul__(self, inner: Pose) -> Pose:
+        return Pose(
+            self.rotation @ inner.rotation, self.rotation @ inner.translation + self.translation
+        )

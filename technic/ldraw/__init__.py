@@ -1,0 +1,1 @@
+"""LDraw text to assembly and back: syntax, documents, library, ports, connections."""

@@ -1,0 +1,1 @@
+"""Rigid or flexible, what moves, how rigid, where it is weak."""

@@ -1,0 +1,1 @@
+"""From an assembly to its matrices K, J, A, S, M."""
