@@ -1,0 +1,240 @@
+"""Assembly -> K, J, A, S, M: the code reads as section 2 of the design.
+
+Unknowns stay in each part's own axes; the world enters in the joint rows only. ``K`` and ``M`` are block
+diagonal with one block per part, so equal parts share one element.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from technic.assembly.model import Assembly, Part
+from technic.fem.build import build_element
+from technic.fem.element import Element
+from technic.geometry import Array, turn_twist
+from technic.parts.definition import Body, MassProperties, RigidBody
+from technic.system.rows import HeldRows, held_rows, transfer
+
+__all__ = ["ElementFactory", "System", "assemble", "element_of"]
+
+ElementFactory = Callable[[Part, Array, tuple[str | None, ...]], Element]
+"""From a part, its attachment points (part coordinates) and their port names, to its element."""
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """The matrices of an assembly, SI units.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    elements : tuple of Element
+        One per part; equal parts with equal attachments share the object.
+    offsets : (p + 1,) ndarray of int
+        Part i owns the unknowns ``offsets[i]:offsets[i + 1]``.
+    K : (n, n) sparse
+        Stiffness of the parts.
+    A : (r, n) sparse
+        Held relative motions: ``A x``.
+    rows : HeldRows
+        Joint, motion and stiffness of every row of `A`.
+    mass_matrix : (n, n) sparse
+        Consistent mass (kg and consistent).
+    R : (n, 6 p) sparse
+        Rigid motions: unknowns when each part moves by a twist about its centroid, world axes.
+    """
+
+    assembly: Assembly
+    elements: tuple[Element, ...]
+    offsets: NDArray[np.int64]
+    K: sparse.csr_array
+    A: sparse.csr_array
+    rows: HeldRows
+    mass_matrix: sparse.csr_array
+    R: sparse.csr_array
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return int(self.offsets[-1])
+
+    @cached_property
+    def elastic(self) -> NDArray[np.bool_]:
+        """Rows of finite stiffness, (r,); the others are held rigidly."""
+        return np.isfinite(self.rows.stiffness)
+
+    @cached_property
+    def S(self) -> sparse.dia_array:
+        """Diagonal matrix of the finite joint stiffnesses; rows held rigidly are left out."""
+        return sparse.diags_array(self.rows.stiffness[self.elastic])
+
+    @cached_property
+    def J(self) -> sparse.csr_array:
+        """Joint stiffness ``A^T S A`` of the rows of finite stiffness."""
+        a = self.A[self.elastic]
+        return sparse.csr_array(a.T @ self.S @ a)
+
+    @cached_property
+    def mass(self) -> float:
+        """Mass of the assembly (kg)."""
+        return float(sum(p.mass_properties.mass for p in self.assembly.parts))
+
+    @cached_property
+    def M(self) -> sparse.csr_array:
+        """Mean square: ``x^T M x`` is the mass-weighted mean of ``|u|^2`` over the assembly (m2)."""
+        return sparse.csr_array(self.mass_matrix / self.mass)
+
+    def nodal(self) -> sparse.csr_array:
+        """Return the unweighted measure of the paper: the sum of ``|u|^2`` over all nodes."""
+        squares = {id(e): np.einsum("pin,pim->nm", e.nodes, e.nodes) for e in self.elements}
+        return _block_diagonal([squares[id(e)] for e in self.elements])
+
+    def part_slice(self, part: int) -> slice:
+        """Return the unknowns of a part."""
+        return slice(int(self.offsets[part]), int(self.offsets[part + 1]))
+
+
+def element_of(part: Part, points: Array, ports: tuple[str | None, ...]) -> Element:
+    """Return the element of a part's own body (frame members or a rigid body)."""
+    return build_element(part.body, part.mass_properties, points)
+
+
+def rigid_element_of(part: Part, points: Array, ports: tuple[str | None, ...]) -> Element:
+    """Return the element of a part that is taken as rigid, whatever its body."""
+    return build_element(RigidBody(), part.mass_properties, points)
+
+
+def assemble(assembly: Assembly, *, element: ElementFactory = element_of) -> System:
+    """Return the matrices of an assembly.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    element : callable
+        What a part becomes: `element_of`, `rigid_element_of`, or one that looks up solid models.
+    """
+    elements, frames, origins = _elements(assembly, element)
+    offsets = np.concatenate([[0], np.cumsum([e.size for e in elements])]).astype(np.int64)
+    rows = held_rows(assembly)
+    side_a, side_b = transfer(assembly, origins, world=False)
+    n = int(offsets[-1])
+    a = _joint_matrix(assembly, rows, (side_a, side_b), frames, offsets, n)
+    if assembly.parts:
+        turns = turn_twist(np.array([p.pose.rotation for p in assembly.parts]))
+        rigid = [e.rigid @ t.T for e, t in zip(elements, turns, strict=True)]
+    else:
+        rigid = []
+    return System(
+        assembly=assembly,
+        elements=elements,
+        offsets=offsets,
+        K=_block_diagonal([e.stiffness for e in elements]),
+        A=a,
+        rows=rows,
+        mass_matrix=_block_diagonal([e.mass for e in elements]),
+        R=_block_diagonal(rigid),
+    )
+
+
+def _elements(
+    assembly: Assembly, element: ElementFactory
+) -> tuple[tuple[Element, ...], list[tuple[Array | None, Array | None]], Array]:
+    """Build each part's element once per kind, and pick both frames of every joint and support."""
+    links: list[tuple[Array, tuple[int, ...], tuple[str | None, ...]]] = []
+    for joint in assembly.joints:
+        links.append((joint.point, joint.parts, joint.ports or (None, None)))
+    for support in assembly.supports:
+        point = assembly.parts[support.part].centroid if support.point is None else support.point
+        links.append((point, (support.part,), (None,)))
+    attached: list[list[tuple[Array, str | None]]] = [[] for _ in assembly.parts]
+    place: list[list[tuple[int, int]]] = []
+    for point, parts, ports in links:
+        row = []
+        for part, port in zip(parts, ports, strict=True):
+            local = assembly.parts[part].pose.to_local(point)
+            # rounding to a nanometre makes equal parts share one element
+            attached[part].append((local.round(9) + 0.0, port))
+            row.append((part, len(attached[part]) - 1))
+        place.append(row)
+    cache: dict[object, Element] = {}
+    elements = []
+    for part, items in zip(assembly.parts, attached, strict=True):
+        points = np.array([p for p, _ in items]).reshape(-1, 3)
+        ports = tuple(port for _, port in items)
+        key = (_identity(part.body, part.mass_properties, part.number), ports, points.tobytes())
+        if key not in cache:
+            cache[key] = element(part, points, ports)
+        elements.append(cache[key])
+    frames: list[tuple[Array | None, Array | None]] = []
+    origins = np.zeros((len(links), 2, 3))
+    for k, row in enumerate(place):
+        pair: list[Array | None] = [None, None]
+        for side, (part, slot) in enumerate(row):
+            pair[side] = elements[part].frames[slot]
+            origins[k, side] = assembly.parts[part].pose.points(elements[part].frame_points[slot])
+        frames.append((pair[0], pair[1]))
+    return tuple(elements), frames, origins
+
+
+def _identity(body: Body, properties: MassProperties, number: str) -> tuple[int, int, str]:
+    return id(body), id(properties), number
+
+
+def _joint_matrix(
+    assembly: Assembly,
+    rows: HeldRows,
+    sides: tuple[Array, Array],
+    frames: list[tuple[Array | None, Array | None]],
+    offsets: NDArray[np.int64],
+    n: int,
+) -> sparse.csr_array:
+    """Return ``A``: row r is ``C_k (T_i W_i x_i - T_j W_j x_j)`` for its link k."""
+    count = len(rows.link)
+    owners = [j.parts for j in assembly.joints] + [(s.part, s.part) for s in assembly.supports]
+    data, row_index, column_index = [], [], []
+    first = np.searchsorted(rows.link, np.arange(len(owners) + 1))
+    for k, parts in enumerate(owners):
+        chosen = slice(first[k], first[k + 1])
+        motions = rows.motion[chosen]
+        for side in (0, 1):
+            w = frames[k][side]
+            if w is None:
+                continue
+            columns = np.flatnonzero(w.any(axis=0))
+            block = sides[side][k][motions] @ w[:, columns]
+            data.append(block.ravel())
+            row_index.append(np.repeat(np.arange(first[k], first[k + 1]), len(columns)))
+            column_index.append(np.tile(columns + offsets[parts[side]], len(motions)))
+    if not data:
+        return sparse.csr_array((count, n))
+    values = np.concatenate(data)
+    keep = values != 0.0
+    coordinates = (np.concatenate(row_index)[keep], np.concatenate(column_index)[keep])
+    return sparse.csr_array((values[keep], coordinates), shape=(count, n))
+
+
+def _block_diagonal(blocks: list[Array]) -> sparse.csr_array:
+    """Return the block diagonal matrix; equal blocks (the same object) are read once."""
+    pattern: dict[int, tuple[Array, Array, Array]] = {}
+    data, rows, columns = [], [], []
+    row = column = 0
+    for block in blocks:
+        if id(block) not in pattern:
+            i, j = np.nonzero(block)
+            pattern[id(block)] = (block[i, j], i, j)
+        values, i, j = pattern[id(block)]
+        data.append(values)
+        rows.append(i + row)
+        columns.append(j + column)
+        row += block.shape[0]
+        column += block.shape[1]
+    if not data:
+        return sparse.csr_array((0, 0))
+    coordinates = (np.concatenate(rows), np.concatenate(columns))
+    return sparse.csr_array((np.concatenate(data), coordinates), shape=(row, column))
