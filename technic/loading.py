@@ -1,0 +1,58 @@
+"""Read a model file, whatever its format, into an assembly."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from technic.assembly.model import Assembly
+from technic.errors import InputError
+
+__all__ = ["READERS", "load"]
+
+READERS: dict[str, tuple[str, str]] = {
+    ".ldr": ("technic.ldraw.reader", "load_ldraw"),
+    ".mpd": ("technic.ldraw.reader", "load_ldraw"),
+    ".dat": ("technic.ldraw.reader", "load_ldraw"),
+    ".io": ("technic.ldraw.reader", "load_ldraw"),
+}
+"""Module and function that read each kind of file, by suffix."""
+
+
+def load(path: str | Path, **options: Any) -> Assembly:
+    """Read a model file.
+
+    Parameters
+    ----------
+    path : path-like
+        LDraw (``.ldr``, ``.mpd``, ``.dat``).
+    **options
+        Passed on to the reader of the format, e.g. ``axle_slide="free"`` for LDraw files.
+
+    Returns
+    -------
+    Assembly
+
+    Raises
+    ------
+    InputError
+        When the file is missing, is no file, has an unknown suffix, or cannot be understood.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise InputError("no such file", path=path, remedy="Check the spelling of the path.")
+    if path.is_dir():
+        raise InputError(
+            "this is a directory", path=path, remedy="Name a model file in it (.ldr or .mpd)."
+        )
+    entry = READERS.get(path.suffix.lower())
+    if entry is None:
+        raise InputError(
+            f"files ending in {path.suffix or 'nothing'!r} are not known",
+            path=path,
+            remedy="Known are: " + ", ".join(sorted(READERS)) + ".",
+        )
+    module, function = entry
+    assembly: Assembly = getattr(import_module(module), function)(path, **options)
+    return assembly
