@@ -1,0 +1,277 @@
+"""Ports of any part, from the primitives in its subfile tree.
+
+LDraw parts are built from shared primitives; those of pin holes, axles, pins, studs and balls say what
+the shape is for. The table below states, for each, which stretch of which local axis it occupies
+(LDraw primitive reference, and the files of the 2022-06 and 2026-02 releases). Scaled primitives
+stretch along. Cylinders and spheres of the right radius serve where a hole or shaft is drawn without
+its primitive.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from technic.errors import InputError
+from technic.geometry import Array
+from technic.ldraw.features import Feature, Piece, PieceKind, build_features, to_ports
+from technic.ldraw.library import Library
+from technic.parts.definition import Port
+
+__all__ = [
+    "Occurrence",
+    "Walker",
+    "features_from_primitives",
+    "ports_from_primitives",
+    "walker_of",
+]
+
+K = PieceKind
+Rule = tuple[PieceKind, float, float]
+"""Kind, and start and end on the local y axis."""
+
+_PIN = (K.PIN, 0.0, -20.0)
+_PIN_FRICTION = (K.PIN_FRICTION, 0.0, -20.0)
+_HALF_PIN = (K.PIN, 0.0, -10.0)
+_UNIT = (0.0, 1.0)
+
+RULES: Final[dict[str, tuple[Rule, ...]]] = {
+    **{f"peghole{n}": ((K.MOUTH, 0.0, 2.0),) for n in ("", 2, 3, 4, 5, 6)},
+    "connhole": ((K.HOLE, -10.0, 10.0),),
+    "connhol2": ((K.HOLE, -10.0, 10.0),),
+    "connhol3": ((K.HOLE, -10.0, 10.0),),
+    "beamhole": ((K.HOLE, -10.0, 10.0),),
+    "beamhol2": ((K.HOLE, -5.0, 5.0),),
+    **{
+        name: ((K.AXLE_HOLE, *_UNIT),)
+        for name in (
+            "axlehole",
+            "axlehol4",
+            "axlehol5",
+            "axlehol6",
+            "axlehol7",
+            "axl2hole",
+            "axl2hol8",
+            "axl3hole",
+            "axl3hol8",
+            "axl4hole",
+            "axl5hole",
+            "axl5hol8",
+        )
+    },
+    "axle": ((K.AXLE, *_UNIT),),
+    "axlehol8": ((K.AXLE_PERIMETER, *_UNIT),),
+    "axleho12": ((K.AXLE, *_UNIT),),
+    "axleend2": ((K.AXLE, 0.0, 2.5),),
+    "axleend20": ((K.AXLE, 0.0, -20.0),),
+    "axleend": ((K.AXLE, 0.0, 0.01),),
+    **{f"connect{n}": (_PIN,) for n in ("", 2, 5, 6, 7, 8, 10)},
+    "connect3": (_HALF_PIN,),
+    "connect4": (_HALF_PIN,),
+    **{f"confric{n}": (_PIN_FRICTION,) for n in ("", 2, 4, 5, 6, 8, 9, 10, 11, 12)},
+    "confric3": ((K.PIN_FRICTION, 0.0, -40.0),),
+    "joint8ball": ((K.BALL, 0.0, -8.0),),
+    **{f"joint8socket{n}": ((K.SOCKET, 0.0, -8.0),) for n in (1, 2, 3)},
+    **{
+        f"stud{n}": ((K.STUD, 0.0, -4.0),)
+        for n in ("", "2", "2a", "a", "6", "6a", "10", "13", "15", "17a", "26", "el", "xa", "p01")
+    },
+    **{
+        f"stud{n}": ((K.TUBE, 0.0, -4.0),)
+        for n in ("3", "3a", "4", "4a", "4o", "4od", "4s", "4h", "16")
+    },
+}
+"""Pieces of each primitive, by its name without ``.dat``."""
+
+_CYLINDER = re.compile(r"^(?:48/|8/)?(\d+)-(\d+)cyl[ioc]2?\.dat$")
+_SPHERE = re.compile(r"^(?:48/|8/)?(\d+)-8sphe\.dat$")
+
+PIN_RADIUS: Final = 6.0
+BALL_RADIUS: Final = 8.0
+COLLAR_RADII: Final = (7.0, 9.5)
+RADIUS_SLACK: Final = 0.3
+
+MAX_DEPTH: Final = 64
+"""Deepest nesting of subfiles; real parts reach 7."""
+
+MAX_OCCURRENCES: Final = 50_000
+"""Most primitives of interest in one part; the largest baseplates have 2,304 studs."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Occurrence:
+    """Primitives of one name below a file: stacked placements.
+
+    Parameters
+    ----------
+    matrices : (n, 3, 3) ndarray
+    offsets : (n, 3) ndarray
+        In LDU, in the coordinates of the file.
+    inverted : (n,) ndarray of bool
+        Seen from inside: an odd number of ``INVERTNEXT`` and mirrorings.
+    """
+
+    matrices: Array
+    offsets: Array
+    inverted: Array
+
+
+class Walker:
+    """Finds the primitives of interest below any file of a library; every file is walked once."""
+
+    def __init__(self, library: Library) -> None:
+        self.library = library
+        self._known: dict[str, dict[str, Occurrence]] = {}
+
+    def occurrences(self, key: str, trail: tuple[str, ...] = ()) -> dict[str, Occurrence]:
+        """Return the primitives of interest below the file at `key`, by name.
+
+        Raises
+        ------
+        InputError
+            The file includes itself, nests too deep or holds too many primitives.
+        """
+        known = self._known.get(key)
+        if known is not None:
+            return known
+        if key in trail:
+            raise InputError(
+                "this library file includes itself: " + " -> ".join([*trail, key]),
+                path=self.library.where(key),
+            )
+        if len(trail) > MAX_DEPTH:
+            raise InputError(f"subfiles nest deeper than {MAX_DEPTH}", path=self.library.where(key))
+        gathered: dict[str, list[Occurrence]] = {}
+        count = 0
+        for reference in self.library.file(key).references:
+            matrix, offset = reference.matrix, reference.offset
+            flip = reference.inverted ^ bool(np.linalg.det(matrix) < 0.0)
+            if _interesting(reference.name):
+                found = {
+                    reference.name: Occurrence(
+                        matrix[None], offset[None], np.array([flip], dtype=bool)
+                    )
+                }
+            else:
+                target = self.library.find(reference.name)
+                if target is None:
+                    continue
+                found = {
+                    name: Occurrence(
+                        matrix @ below.matrices,
+                        below.offsets @ matrix.T + offset,
+                        below.inverted ^ flip,
+                    )
+                    for name, below in self.occurrences(target, (*trail, key)).items()
+                }
+            for name, occurrence in found.items():
+                gathered.setdefault(name, []).append(occurrence)
+                count += len(occurrence.offsets)
+            if count > MAX_OCCURRENCES:
+                raise InputError(
+                    f"more than {MAX_OCCURRENCES} primitives in one part",
+                    path=self.library.where(key),
+                )
+        out = {
+            name: Occurrence(
+                np.concatenate([o.matrices for o in group]),
+                np.concatenate([o.offsets for o in group]),
+                np.concatenate([o.inverted for o in group]),
+            )
+            for name, group in gathered.items()
+        }
+        self._known[key] = out
+        return out
+
+
+def _interesting(name: str) -> bool:
+    return (
+        name.removesuffix(".dat") in RULES
+        or _CYLINDER.match(name) is not None
+        or _SPHERE.match(name) is not None
+    )
+
+
+def _pieces(occurrences: dict[str, Occurrence], matrix: Array, offset: Array) -> list[Piece]:
+    """Return the pieces that the primitives stand for."""
+    out: list[Piece] = []
+    for name, group in occurrences.items():
+        matrices = matrix @ group.matrices
+        offsets = group.offsets @ matrix.T + offset
+        cylinder, sphere = _CYLINDER.match(name), _SPHERE.match(name)
+        for m, t, inverted in zip(matrices, offsets, group.inverted, strict=True):
+            if cylinder:
+                share = int(cylinder.group(1)) / int(cylinder.group(2))
+                out += _cylinder(m, t, share, bool(inverted))
+            elif sphere:
+                out += _sphere(m, t, bool(inverted))
+            else:
+                for kind, low, high in RULES[name.removesuffix(".dat")]:
+                    axis = m[:, 1]
+                    out.append(Piece(kind, t + low * axis, t + high * axis, inward=bool(inverted)))
+    return out
+
+
+def _cylinder(m: Array, t: Array, share: float, inverted: bool) -> list[Piece]:
+    """Return what a piece of a cylinder says about its line, if anything."""
+    radii = np.linalg.norm(m[:, [0, 2]], axis=0)
+    if abs(radii[0] - radii[1]) > RADIUS_SLACK or abs(float(m[:, 0] @ m[:, 2])) > 1.0:
+        return []
+    radius, end = float(radii.mean()), t + m[:, 1]
+    if abs(radius - PIN_RADIUS) <= RADIUS_SLACK:
+        return [Piece(K.WALL if inverted else K.SHANK, t, end, share, inverted)]
+    if COLLAR_RADII[0] <= radius <= COLLAR_RADII[1] and not inverted and share > 0.9:
+        return [Piece(K.COLLAR, t, end, share)]
+    return []
+
+
+def _sphere(m: Array, t: Array, inverted: bool) -> list[Piece]:
+    """Return a ball or a socket for a sphere of a ball joint's radius."""
+    radii = np.linalg.norm(m, axis=0)
+    if np.abs(radii - BALL_RADIUS).max() > RADIUS_SLACK:
+        return []
+    axis = m[:, 1] / radii[1]
+    return [Piece(K.SOCKET if inverted else K.BALL, t + axis, t - axis)]
+
+
+def features_from_primitives(walker: Walker, number: str) -> tuple[Feature, ...] | None:
+    """Return the whole features of a part (LDU), or None when the library does not have it."""
+    resolved = walker.library.resolve(number)
+    if resolved is None:
+        return None
+    found = walker.occurrences(resolved.key)
+    return build_features(_pieces(found, resolved.matrix, resolved.offset))
+
+
+def ports_from_primitives(library: Library, number: str) -> tuple[Port, ...] | None:
+    """Return the ports of a part, from its primitives.
+
+    Parameters
+    ----------
+    library : Library
+    number : str
+        LDraw number, with or without ``.dat``.
+
+    Returns
+    -------
+    tuple of Port or None
+        In part coordinates (m); None when the library does not have the part.
+
+    Raises
+    ------
+    InputError
+        The part's files are broken.
+    """
+    features = features_from_primitives(walker_of(library), number)
+    return None if features is None else to_ports(features)
+
+
+def walker_of(library: Library) -> Walker:
+    """Return the library's walker; made once, so that shared subfiles are walked once."""
+    walker = library.memo.get("walker")
+    if not isinstance(walker, Walker):
+        walker = library.memo["walker"] = Walker(library)
+    return walker
