@@ -35,6 +35,14 @@ TOUCH: Final = 1.0 * LDU
 COUNTERBORE: Final = 2.0 * LDU
 """Depth of a pin hole's counterbore: a collar may sit this far inside the hole it stops at."""
 
+NEAR_MISS: Final = 10.0 * LDU
+"""A pin end and a hole whose lines are further apart than `RADIAL_OFFSET` but not more than this (half
+a pitch, beyond which another hole would be as near) miss each other narrowly."""
+
+NEAR_MISS_ANGLE: Final = radians(15.0)
+"""The same for the angle between them: three times `ANGLE`, less than any angle that a builder means
+(the flattest bent beam turns by 36.87 degrees)."""
+
 # --- file input -------------------------------------------------------------------------------
 ROTATION_WARNING: Final = 1e-2
 """A rotation matrix further from orthonormal than this is warned about (most are within 1e-6; a few
@@ -64,6 +72,24 @@ MAIN_COMPONENT_SHARE: Final = 0.8
 """The model is `disconnected` when its biggest component holds less than this share of the parts
 that carry structure."""
 
+PIVOT_ZERO: Final = 1e-3
+"""Singular values of one body's own columns below this are free motions of that body (true motions
+stay below it, see `MOBILITY_CUT`)."""
+
+PIVOT_CLEAR: Final = 5e-2
+"""A body is eliminated only when its other singular values exceed this, so that errors grow by at
+most a factor of twenty per step; unclear bodies go into the dense core."""
+
+RITZ_LIMIT: Final = 0.1
+"""Core vectors with singular values below this enter the Rayleigh-Ritz step: thirty times the cut."""
+
+RITZ_EXTRA: Final = 4
+"""Further core vectors that enter it, so that the smallest value kept is seen."""
+
 # --- numerics ---------------------------------------------------------------------------------
 EIGEN_RESIDUAL: Final = 1e-6
 """Largest accepted relative residual |K x - lambda M x| / |K x| of a reported eigenpair."""
+
+CONSTRAINT_COMPLIANCE: Final = 1e-6
+"""Compliance of a motion that is held rigidly, in units of the stiffest spring of the model: a
+millionth of the smallest compliance there is, and enough to settle redundant constraints."""

@@ -1,0 +1,216 @@
+"""Which joints hold what, on rigid parts: the matrix whose null space is the set of motions.
+
+Twists are taken about each part's centroid in world axes, translations divided by one length of the
+model, so that all entries are of order one and one tolerance serves (design, section 2.3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import networkx as nx
+import numpy as np
+from numpy.typing import NDArray
+
+from technic.assembly.model import Assembly
+from technic.geometry import Array, shift_twist
+from technic.rigidity.nullspace import Block, NullSpace, null_space
+from technic.system.rows import held_rows, transfer
+from technic.tolerances import MOBILITY_LENGTH
+
+__all__ = ["ComponentMotions", "Kinematics", "component_motions", "kinematics", "rigid_twists"]
+
+PLANE = np.array([0, 1, 5])
+"""Unknowns of a twist that stay in the plane z = 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kinematics:
+    """Scaled joint rows on rigid parts.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    length : float
+        What translations are divided by (m).
+    origins : (p, 3) ndarray
+        Reference points: the parts' centroids (m).
+    sides : (links, 2, 6, 6) ndarray
+        Relative motion in the joint's axes per scaled twist of either part; links are the joints,
+        then the supports.
+    held : (links, 6) ndarray of bool
+    owners : tuple of tuple of int
+        Parts of each link: two for a joint, one for a support.
+    components : tuple of tuple of int
+        Parts that hang together, each sorted; heaviest component first.
+    """
+
+    assembly: Assembly
+    length: float
+    origins: Array
+    sides: Array
+    held: NDArray[np.bool_]
+    owners: tuple[tuple[int, ...], ...]
+    components: tuple[tuple[int, ...], ...]
+
+    @property
+    def dofs(self) -> NDArray[np.int64]:
+        """Unknowns of a twist that count: all six in space, three in the plane."""
+        return PLANE if self.assembly.dimension == 2 else np.arange(6)
+
+    @cached_property
+    def component_of(self) -> NDArray[np.int64]:
+        """Component of every part."""
+        out = np.zeros(len(self.assembly.parts), dtype=np.int64)
+        for c, parts in enumerate(self.components):
+            out[list(parts)] = c
+        return out
+
+    def links_of(self, component: int) -> list[int]:
+        """Return the joints and supports of a component."""
+        own = self.component_of
+        return [k for k, owner in enumerate(self.owners) if own[owner[0]] == component]
+
+    def unscale(self, twists: Array) -> Array:
+        """Return scaled twists, (..., 6), in metres and radians."""
+        return twists * np.array([self.length] * 3 + [1.0] * 3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ComponentMotions:
+    """All motions of one component, its rigid motions included.
+
+    Parameters
+    ----------
+    parts : tuple of int
+    twists : (len(parts), 6, k) ndarray
+        Orthonormal basis of the null space as scaled twists, world axes.
+    rigid : int
+        How many of them are motions of the component as a whole: 6 in space, 3 in the plane, 0 when
+        it has a support.
+    smallest_kept, largest_dropped : float
+        Singular values on either side of the cut.
+    """
+
+    parts: tuple[int, ...]
+    twists: Array
+    rigid: int
+    smallest_kept: float
+    largest_dropped: float
+
+    @property
+    def internal(self) -> int:
+        """Number of internal motions."""
+        return int(self.twists.shape[2]) - self.rigid
+
+
+def kinematics(assembly: Assembly) -> Kinematics:
+    """Return the scaled joint rows of an assembly on rigid parts."""
+    origins = np.array([p.centroid for p in assembly.parts]).reshape(-1, 3)
+    owners = tuple(j.parts for j in assembly.joints) + tuple((s.part,) for s in assembly.supports)
+    reference = np.array([[origins[o[0]], origins[o[-1]]] for o in owners]).reshape(-1, 2, 3)
+    side_a, side_b = transfer(assembly, reference, world=True)
+    length = _length(assembly, reference)
+    shrink = np.array([1 / length] * 3 + [1.0] * 3)
+    sides = np.stack([side_a, side_b], axis=1) * shrink[:, None] / shrink
+    held = np.array([j.held for j in assembly.joints] + [s.held for s in assembly.supports], dtype=bool)
+    return Kinematics(
+        assembly=assembly,
+        length=length,
+        origins=origins,
+        sides=sides,
+        held=held.reshape(-1, 6),
+        owners=owners,
+        components=_components(assembly),
+    )
+
+
+def _length(assembly: Assembly, reference: Array) -> float:
+    """Return the scaling length: fixed for LEGO parts, RMS arm of the joints for anything else."""
+    if all(p.definition is not None for p in assembly.parts) or not assembly.joints:
+        return MOBILITY_LENGTH
+    points = np.array([j.point for j in assembly.joints])
+    arms = points[:, None, :] - reference[: len(points)]
+    rms = float(np.sqrt(np.mean(np.sum(arms**2, axis=-1))))
+    return rms if rms > 0.0 else MOBILITY_LENGTH
+
+
+def _components(assembly: Assembly) -> tuple[tuple[int, ...], ...]:
+    graph = nx.Graph()
+    graph.add_nodes_from(range(len(assembly.parts)))
+    graph.add_edges_from(j.parts for j in assembly.joints)
+    mass = [p.mass_properties.mass for p in assembly.parts]
+    found = [tuple(sorted(c)) for c in nx.connected_components(graph)]
+    return tuple(sorted(found, key=lambda c: (-sum(mass[k] for k in c), c)))
+
+
+def component_motions(kin: Kinematics, component: int) -> ComponentMotions:
+    """Return the null space of one component: every motion in which each joint is respected."""
+    parts = kin.components[component]
+    links = kin.links_of(component)
+    dofs = kin.dofs
+    width = len(dofs)
+    grounded = any(len(kin.owners[k]) == 1 for k in links)
+    bodies = _merge_fixed(kin, parts, links)
+    heads = sorted(set(bodies.values()))
+    number = {h: k for k, h in enumerate(heads)}
+    carry = {
+        p: _carry(kin, bodies[p], p)[np.ix_(dofs, dofs)] for p in parts
+    }  # twist of the body's head -> twist of the part
+    blocks: list[Block] = []
+    for k in links:
+        owner = kin.owners[k]
+        rows = kin.held[k]
+        if len(owner) == 2 and bodies[owner[0]] == bodies[owner[1]]:
+            continue
+        block = [kin.sides[k, s][np.ix_(rows, dofs)] @ carry[p] for s, p in enumerate(owner)]
+        blocks.append((tuple(number[bodies[p]] for p in owner), np.hstack(block)))
+    space: NullSpace = null_space(blocks, len(heads), width)
+    count = space.basis.shape[1]
+    per_head = space.basis.reshape(len(heads), width, count)
+    twists = np.zeros((len(parts), 6, count))
+    for k, p in enumerate(parts):
+        twists[k, dofs] = carry[p] @ per_head[number[bodies[p]]]
+    flat, _ = np.linalg.qr(twists.reshape(-1, count))
+    return ComponentMotions(
+        parts=parts,
+        twists=flat.reshape(len(parts), 6, count),
+        rigid=0 if grounded else (3 if width == 3 else 6),
+        smallest_kept=space.smallest_kept,
+        largest_dropped=space.largest_dropped,
+    )
+
+
+def _merge_fixed(kin: Kinematics, parts: tuple[int, ...], links: list[int]) -> dict[int, int]:
+    """Return, for each part, the head of the body it belongs to: fixed joints make one body of two.
+
+    The head is the part nearest to the body's middle, so that arms stay short.
+    """
+    graph = nx.Graph()
+    graph.add_nodes_from(parts)
+    graph.add_edges_from(
+        kin.owners[k] for k in links if len(kin.owners[k]) == 2 and kin.held[k].all()
+    )
+    heads: dict[int, int] = {}
+    for group in nx.connected_components(graph):
+        members = sorted(group)
+        middle = kin.origins[members].mean(axis=0)
+        near = np.linalg.norm(kin.origins[members] - middle, axis=1).round(9)
+        head = members[int(np.argmin(near))]
+        heads.update(dict.fromkeys(members, head))
+    return heads
+
+
+def _carry(kin: Kinematics, head: int, part: int) -> Array:
+    arm = (kin.origins[part] - kin.origins[head]) / kin.length
+    return shift_twist(arm)
+
+
+def rigid_twists(kin: Kinematics, parts: tuple[int, ...]) -> Array:
+    """Return the motions of a component as a whole, (len(parts), 6, 6 or 3), scaled twists.
+
+    The reference point is the mean of the parts' centroids.
+    """
+    arms = (kin.origins[list(parts)] - kin.origins[list(parts)].mean(axis=0)) / kin.length
+    return shift_twist(arms)[:, :, kin.dofs]
