@@ -1,6 +1,4 @@
-"""``python -m technic`` is the command ``technic``."""
-
-from __future__ import annotations
+"""``python -m technic`` is the same as ``technic``."""
 
 from technic.cli import main
 

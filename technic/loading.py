@@ -54,5 +54,9 @@ def load(path: str | Path, **options: Any) -> Assembly:
             remedy="Known are: " + ", ".join(sorted(READERS)) + ".",
         )
     module, function = entry
-    assembly: Assembly = getattr(import_module(module), function)(path, **options)
+    try:
+        assembly: Assembly = getattr(import_module(module), function)(path, **options)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(f"cannot be read: {reason}", path=error.filename or path) from error
     return assembly

@@ -312,7 +312,9 @@ def to_dict(report: RigidityReport) -> dict[str, Any]:
                 "point_mm": None if support.point is None else _vector(support.point / MM),
                 "held": [
                     name
-                    for name, held in zip(("x", "y", "z", "rx", "ry", "rz"), support.held, strict=True)
+                    for name, held in zip(
+                        ("x", "y", "z", "rx", "ry", "rz"), support.held, strict=True
+                    )
                     if held
                 ],
             }

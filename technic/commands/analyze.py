@@ -1,0 +1,149 @@
+"""`technic analyze`: is it rigid, what moves, how rigid, where is it weak?"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from technic.commands.options import (
+    AnalysisOptions,
+    AxleSlide,
+    AxleSlideOption,
+    BodyKind,
+    BodyKindOption,
+    FixOption,
+    JsonOption,
+    Measure,
+    MeasureOption,
+    MinRigidityOption,
+    ModesOption,
+    PictureOption,
+    QuietOption,
+    RequireRigidOption,
+)
+
+if TYPE_CHECKING:
+    from technic.rigidity.result import RigidityReport
+
+__all__ = ["analyze", "run"]
+
+_BELOW_DEMAND = 1
+
+
+def _check_targets(options: AnalysisOptions) -> None:
+    """Refuse unwritable targets before minutes are spent on the answer."""
+    from technic.report.files import check_writable
+    from technic.report.json import STDOUT
+
+    if options.json is not None and options.json != STDOUT:
+        check_writable(Path(options.json))
+    if options.picture is not None:
+        check_writable(options.picture)
+
+
+def _demands(report: RigidityReport, options: AnalysisOptions) -> list[str]:
+    """Return what the caller demanded and the model does not give, one sentence each."""
+    from technic.report.wording import number
+    from technic.rigidity.result import Verdict
+
+    missed = []
+    if options.require_rigid and report.verdict is not Verdict.RIGID:
+        missed.append(f"the model is {report.verdict.value}, --require-rigid demands a rigid one")
+    if options.min_rigidity is not None:
+        if report.rigidity is None:
+            missed.append("the model has no rigidity to compare with --min-rigidity")
+        elif report.rigidity.value < options.min_rigidity:
+            missed.append(
+                f"the rigidity is {number(report.rigidity.value, 6)} N/m, "
+                f"--min-rigidity demands {number(options.min_rigidity, 6)} N/m"
+            )
+    return missed
+
+
+def run(model: Path, options: AnalysisOptions) -> None:
+    """Load, analyze and report, as `technic analyze` and `technic demo` do.
+
+    Raises
+    ------
+    TechnicError
+        With the exit code that its kind has.
+    typer.Exit
+        With code 1 when the model is below what was demanded.
+    """
+    from technic.assembly.select import parse_fix
+    from technic.loading import load
+    from technic.report.json import STDOUT, write_json
+    from technic.rigidity.analyze import analyze as analyze_assembly
+
+    _check_targets(options)
+    painter = None
+    if options.picture is not None:
+        from technic.report.render import Painter
+
+        # The drawing program starts while the analysis runs.
+        painter = Painter()
+    try:
+        assembly = load(model, axle_slide=options.axle_slide)
+        if options.fix:
+            supports = tuple(parse_fix(assembly, text) for text in options.fix)
+            assembly = replace(assembly, supports=assembly.supports + supports)
+        report = analyze_assembly(
+            assembly, measure=options.measure, modes=options.modes, parts=options.parts
+        )
+        if options.json is not None:
+            write_json(report.to_dict(), options.json)
+        if not options.quiet and options.json != STDOUT:
+            from technic.report.style import style_for
+            from technic.report.text import to_text
+
+            sys.stdout.write(to_text(report, style_for(sys.stdout)))
+            sys.stdout.flush()
+        missed = _demands(report, options)
+        for sentence in missed:
+            typer.echo(f"technic: {sentence}", err=True)
+        if painter is not None and options.picture is not None:
+            from technic.report.picture import report_scene
+
+            painter.draw(report_scene(report), options.picture)
+            if not options.quiet:
+                typer.echo(f"picture: {options.picture}", err=True)
+    finally:
+        if painter is not None:
+            painter.close()
+    if missed:
+        raise typer.Exit(_BELOW_DEMAND)
+
+
+def analyze(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="LDraw file (.ldr, .mpd).")],
+    json: JsonOption = None,
+    picture: PictureOption = None,
+    fix: FixOption = None,
+    measure: MeasureOption = Measure.mean_square,
+    axle_slide: AxleSlideOption = AxleSlide.held,
+    modes: ModesOption = 6,
+    parts: BodyKindOption = BodyKind.frame,
+    require_rigid: RequireRigidOption = False,
+    min_rigidity: MinRigidityOption = None,
+    quiet: QuietOption = False,
+) -> None:
+    """Say how rigid a model is, what can move, and where it is weak."""
+    run(
+        model,
+        AnalysisOptions(
+            json=json,
+            picture=picture,
+            fix=tuple(fix or ()),
+            measure=measure.value,
+            axle_slide=axle_slide.value,
+            modes=modes,
+            parts=parts.value,
+            require_rigid=require_rigid,
+            min_rigidity=min_rigidity,
+            quiet=quiet,
+        ),
+    )

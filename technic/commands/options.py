@@ -1,0 +1,112 @@
+"""Command-line options that several commands share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = [
+    "AnalysisOptions",
+    "AxleSlide",
+    "AxleSlideOption",
+    "BodyKind",
+    "BodyKindOption",
+    "FixOption",
+    "JsonOption",
+    "Measure",
+    "MeasureOption",
+    "MinRigidityOption",
+    "ModesOption",
+    "PictureOption",
+    "QuietOption",
+    "RequireRigidOption",
+]
+
+
+class Measure(StrEnum):
+    """How displacement is measured."""
+
+    mean_square = "mean_square"
+    nodal = "nodal"
+
+
+class AxleSlide(StrEnum):
+    """Whether friction holds an axle in an axle hole."""
+
+    held = "held"
+    free = "free"
+
+
+class BodyKind(StrEnum):
+    """What a part is made of in the mechanics."""
+
+    frame = "frame"
+    rigid = "rigid"
+
+
+JsonOption = Annotated[
+    str | None,
+    typer.Option("--json", metavar="PATH|-", help="Write the report as JSON; - is stdout."),
+]
+PictureOption = Annotated[
+    Path | None, typer.Option("--picture", metavar="PNG", help="Draw the result into a PNG file.")
+]
+FixOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fix",
+        metavar="PART[:PORT]",
+        help="Hold a part (its id, the end of it, or a number the model has once) or one of its "
+        "ports to the ground. May be repeated.",
+    ),
+]
+MeasureOption = Annotated[
+    Measure,
+    typer.Option(
+        "--measure", help="mean_square: N/m, whatever the mesh; nodal: the measure of the paper."
+    ),
+]
+AxleSlideOption = Annotated[
+    AxleSlide,
+    typer.Option("--axle-slide", help="Axles in axle holes: held by friction, or free to slide."),
+]
+ModesOption = Annotated[
+    int, typer.Option("--modes", min=1, max=200, metavar="K", help="How many elastic modes.")
+]
+BodyKindOption = Annotated[
+    BodyKind,
+    typer.Option("--parts", help="frame: beams bend; rigid: only joints give way."),
+]
+RequireRigidOption = Annotated[
+    bool, typer.Option("--require-rigid", help="Exit with 1 when the model is not rigid.")
+]
+MinRigidityOption = Annotated[
+    float | None,
+    typer.Option(
+        "--min-rigidity", min=0.0, metavar="N/m", help="Exit with 1 when the rigidity is lower."
+    ),
+]
+QuietOption = Annotated[
+    bool,
+    typer.Option("--quiet", "-q", help="No text: only the files asked for, and the exit code."),
+]
+
+
+@dataclass(frozen=True, slots=True)
+class AnalysisOptions:
+    """What the caller of `technic analyze` asked for."""
+
+    json: str | None = None
+    picture: Path | None = None
+    fix: tuple[str, ...] = ()
+    measure: str = "mean_square"
+    axle_slide: str = "held"
+    modes: int = 6
+    parts: str = "frame"
+    require_rigid: bool = False
+    min_rigidity: float | None = None
+    quiet: bool = False

@@ -1,0 +1,323 @@
+"""The report as a builder reads it on a terminal."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from technic.assembly.model import FindingKind
+from technic.report.bodies import moving_groups
+from technic.report.pattern import describe_field
+from technic.report.style import Style
+from technic.report.wording import (
+    DIRECTION_WORDS,
+    count,
+    direction_of,
+    joined,
+    number,
+    part_name,
+    part_names,
+    place,
+)
+from technic.rigidity.result import Motion, MotionKind, RigidityReport, Verdict
+from technic.rigidity.serialize import joint_stiffness, size_mm, spot_place, unit_load
+from technic.units import MM
+
+__all__ = ["to_text"]
+
+_STRUCTURAL_SHOWN = 8
+_HARMLESS_SHOWN = 5
+_SPOTS_SHOWN = 5
+_FINDINGS_SHOWN = 3
+"""Longer lists are in the JSON report; a person acts on the first few."""
+
+_PUSHED = 0.5
+"""Parts that go at least this share of the furthest way are named in the softest direction."""
+
+_VERDICTS = {
+    Verdict.RIGID: ("good", "RIGID"),
+    Verdict.FLEXIBLE: ("bad", "FLEXIBLE"),
+    Verdict.DISCONNECTED: ("bad", "DISCONNECTED"),
+    Verdict.UNDETERMINED: ("warn", "UNDETERMINED"),
+}
+
+_ORDERS = {
+    "finite": "a real mechanism: it keeps moving",
+    "first-order": "shaky: moves a little through pin play, not a mechanism",
+}
+
+_FINDING_WORDS = {
+    FindingKind.OFF_GRID: ("joint placed off the grid", "joints placed off the grid"),
+    FindingKind.NEAR_MISS: ("near miss", "near misses"),
+    FindingKind.OPEN_PORT: ("open pin or axle end", "open pin or axle ends"),
+    FindingKind.SINGLE_PIN: ("part on a single pin", "parts on a single pin"),
+    FindingKind.ONE_PART_PIN: ("pin in one part only", "pins in one part only"),
+    FindingKind.NO_PIN: ("pair of aligned holes with no pin", "pairs of aligned holes with no pin"),
+    FindingKind.LOOSE: ("loose part", "loose parts"),
+    FindingKind.FLEXIBLE: ("flexible item, not modelled", "flexible items, not modelled"),
+    FindingKind.WARNING: ("warning", "warnings"),
+}
+
+
+def _more(n: int) -> str:
+    return f"and {n} more, see --json"
+
+
+def _headline(report: RigidityReport, style: Style) -> list[str]:
+    assembly = report.assembly
+    size = " x ".join(number(value) for value in size_mm(assembly))
+    title = (
+        f"{assembly.name}: {count(len(assembly.parts), 'part')}, "
+        f"{count(len(assembly.joints), 'joint')}, {size} mm, {number(report.mass * 1e3)} g"
+    )
+    kind, word = _VERDICTS[report.verdict]
+    lines = [style("bold", title), "", style(kind, word)]
+    if report.reason:
+        lines += style.wrap(report.reason)
+    return lines
+
+
+def _bodies(report: RigidityReport, style: Style) -> list[str]:
+    lines: list[str] = []
+    for c, component in enumerate(report.components[:1]):
+        main, *others = moving_groups(report, c)
+        whole = "Main body" if len(component.parts) > 1 else "The only part"
+        said = f"{whole}: {count(len(main), 'part')}, rigid."
+        if component.verdict is Verdict.UNDETERMINED:
+            said = f"{whole}: {count(len(main), 'part')}."
+        if others:
+            said += (
+                f" {count(len(others), 'other group')} can move against it "
+                f"({joined([count(len(group), 'part') for group in others[:6]])}"
+                f"{', ...' if len(others) > 6 else ''})."
+            )
+        lines += style.wrap(said)
+    rest = report.components[1:]
+    if rest:
+        parts = sum(len(component.parts) for component in rest)
+        lines += style.wrap(
+            f"{count(parts, 'part')} in {count(len(rest), 'separate piece')} not joined to it"
+            + (f", the largest: {part_names(report.assembly, rest[0].parts)}." if parts else ".")
+        )
+    return lines
+
+
+def _sentence(report: RigidityReport, motion: Motion) -> str:
+    said = motion.sentence or (
+        f"{part_names(report.assembly, motion.parts)} can move ({motion.type.value})"
+    )
+    order = _ORDERS.get(motion.order or "")
+    return f"{said.rstrip('.')}" + (f" ({order})." if order else ".")
+
+
+def _motions(report: RigidityReport, style: Style) -> list[str]:
+    by_kind = {
+        kind: [motion for motion in report.motions if motion.kind is kind] for kind in MotionKind
+    }
+    mobility, qualifier = report.mobility, f"{report.qualifier} " if report.qualifier else ""
+    lines: list[str] = []
+    structural = by_kind[MotionKind.STRUCTURAL]
+    if mobility.structural:
+        lines += [
+            "",
+            style("bold", f"What moves: {qualifier}{count(mobility.structural, 'motion')}"),
+        ]
+        for n, motion in enumerate(structural[:_STRUCTURAL_SHOWN], 1):
+            lines += style.wrap(_sentence(report, motion), f" {n:2d}. ", "     ")
+        if len(structural) > _STRUCTURAL_SHOWN:
+            lines.append("     " + _more(len(structural) - _STRUCTURAL_SHOWN))
+        lines += style.wrap(
+            "Look at the first one: close it and count again. The usual cause is a part held by one "
+            "pin only, or a frame of four sides without a diagonal."
+        )
+    for kind, word, total in (
+        (MotionKind.SPINNING, "Spinning freely", mobility.spinning),
+        (MotionKind.SLIDING, "Sliding", mobility.sliding),
+    ):
+        motions = by_kind[kind]
+        if not total:
+            continue
+        lines += ["", style("bold", f"{word}: {total}")]
+        for motion in motions[:_HARMLESS_SHOWN]:
+            lines += style.wrap(_sentence(report, motion), "   - ", "     ")
+        if len(motions) > _HARMLESS_SHOWN:
+            lines.append("     " + _more(len(motions) - _HARMLESS_SHOWN))
+    if mobility.idle:
+        lines += [
+            "",
+            f"{count(mobility.idle, 'pin or other fastener', 'pins and other fasteners')} "
+            f"{'turns' if mobility.idle == 1 else 'turn'} in place: harmless.",
+        ]
+    return lines
+
+
+def _softest(report: RigidityReport, style: Style) -> list[str]:
+    load = unit_load(report)
+    if load is None:
+        return []
+    _, twists = load
+    assembly = report.assembly
+    members = report.components[0].parts
+    points = np.array([assembly.parts[k].centroid for k in members])
+    masses = np.array([assembly.parts[k].mass_properties.mass for k in members])
+    lines = ["", style("bold", "Softest direction")]
+    phrase = describe_field(points, twists[list(members), :3], masses)
+    if phrase:
+        lines += style.wrap(f"   {phrase[0].upper()}{phrase[1:]}.")
+    frames = [k for k in members if not assembly.parts[k].fastener] or list(members)
+    way = {k: float(np.linalg.norm(twists[k, :3])) for k in frames}
+    furthest = max(way.values())
+    sides: dict[tuple[int, int], list[int]] = {}
+    for k in sorted(frames, key=lambda k: (-way[k], k)):
+        if furthest > 0.0 and way[k] >= _PUSHED * furthest:
+            sides.setdefault(direction_of(twists[k, :3]), []).append(k)
+    for side, parts in sides.items():
+        names = [f"{part_name(assembly.parts[k])} {number(way[k] / MM)} mm" for k in parts[:2]]
+        rest = f" and {len(parts) - 2} more" if len(parts) > 2 else ""
+        lines += style.wrap(", ".join(names) + rest, f"   {DIRECTION_WORDS[side]}: ", "        ")
+    return lines
+
+
+def _rigidity(report: RigidityReport, style: Style) -> list[str]:
+    rigidity = report.rigidity
+    if rigidity is None:
+        return ["", "No rigidity is given: the model has no elastic part or joint to deform."]
+    value = style("number", f"{number(rigidity.value)} N/m")
+    lines = ["", f"{style('bold', 'Rigidity')}  {value} (worst case)"]
+    if rigidity.measure == "nodal":
+        lines += style.wrap(
+            "The paper's measure: energy per squared sum of node displacements. It depends on how "
+            "finely the parts are divided; compare it only with values found the same way.",
+            "   ",
+        )
+    else:
+        lines.append(
+            "   The softest way to push this model: 1 N moves it "
+            f"{number(rigidity.compliance_mm_per_n)} mm."
+        )
+    if rigidity.frequency_hz is not None:
+        lines.append(f"   Lowest natural frequency: {number(rigidity.frequency_hz)} Hz.")
+    if rigidity.interval_95 is None:
+        lines.append("   How sure: not known, the joints' stiffnesses are not calibrated.")
+    else:
+        low, high = rigidity.interval_95
+        lines.append(f"   How sure: {number(low)} to {number(high)} N/m with 95 % confidence.")
+    if report.mobility.total > report.mobility.idle:
+        lines += style.wrap(
+            "The motions above cost nothing; this number is for what bends once they stand still.",
+            "   ",
+        )
+    return lines + _softest(report, style)
+
+
+def _weak_spots(report: RigidityReport, style: Style) -> list[str]:
+    if not report.weak_spots:
+        return []
+    assembly = report.assembly
+    shown = report.weak_spots[:_SPOTS_SHOWN]
+    lines = ["", style("bold", "Weakest spots (share of the strain energy of the softest way)")]
+    for spot in shown:
+        names = [part_name(assembly.parts[k]) for k in spot.parts]
+        what = f"joint of {joined(names)}" if spot.kind == "joint" else f"bending of {names[0]}"
+        lines += style.wrap(
+            f"{what}; {place(spot_place(assembly, spot))}",
+            f" {spot.rank:2d}. {100.0 * spot.energy_share:4.1f} %  ",
+            "             ",
+        )
+    rest = len(report.weak_spots) - len(shown)
+    if rest:
+        share = 100.0 * sum(spot.energy_share for spot in report.weak_spots[len(shown) :])
+        lines.append(f"     {share:4.1f} %  in {rest} more, see --json")
+    return lines
+
+
+def _unknown(report: RigidityReport, style: Style) -> list[str]:
+    unknown = report.assembly.unknown
+    if not unknown:
+        return []
+    total = sum(entry.count for entry in unknown)
+    lines = ["", style("warn", f"Not understood, left out of the analysis: {count(total, 'part')}")]
+    for entry in sorted(unknown, key=lambda entry: (-entry.count, entry.number)):
+        where = ", ".join(str(line) for line in entry.lines[:6])
+        dots = ", ..." if len(entry.lines) > 6 else ""
+        word = "line" if len(entry.lines) == 1 else "lines"
+        lines += style.wrap(
+            f"{entry.count} x {entry.number}: {entry.reason}; {word} {where}{dots}", "   ", "      "
+        )
+    return lines
+
+
+def _findings(report: RigidityReport, style: Style) -> list[str]:
+    findings = report.assembly.findings
+    if not findings:
+        return []
+    numbers = Counter(finding.kind for finding in findings)
+    lines = ["", style("bold", "Found while reading")]
+    for kind in FindingKind:
+        if not numbers[kind]:
+            continue
+        singular, plural = _FINDING_WORDS[kind]
+        lines.append(f"   {count(numbers[kind], singular, plural)}")
+        if kind is FindingKind.OPEN_PORT:
+            continue  # most open ends are meant to be open: only counted
+        found = [finding for finding in findings if finding.kind is kind]
+        for finding in found[:_FINDINGS_SHOWN]:
+            lines += style.wrap(finding.message, "     - ", "       ")
+        if len(found) > _FINDINGS_SHOWN:
+            lines.append("       " + _more(len(found) - _FINDINGS_SHOWN))
+    return lines
+
+
+_UNITS = {"n_per_m": "N/m", "nm_per_rad": "N m/rad"}
+
+
+def _assumptions(report: RigidityReport, style: Style) -> list[str]:
+    lines: list[str] = []
+    if report.not_modelled:
+        lines += ["", style("bold", "Not modelled")]
+        for item in report.not_modelled:
+            lines += style.wrap(item, "   - ", "     ")
+    entries = joint_stiffness(report.assembly)
+    if entries:
+        lines += ["", style("bold", "Joints and where their stiffness comes from")]
+    for entry in entries:
+        said = []
+        for key, value in entry["values"].items():
+            motion, _, unit = key.partition("_")
+            values = value if isinstance(value, list) else [value]
+            amount = " to ".join(v if isinstance(v, str) else number(v) for v in values)
+            said.append(f"{motion} {amount}" + ("" if amount == "rigid" else f" {_UNITS[unit]}"))
+        name = entry["connection"] or entry["type"]
+        lines += style.wrap(
+            f"{entry['count']} x {name} ({entry['type']}): {', '.join(said)}; "
+            f"source: {entry['provenance'] or 'not stated'}",
+            "   ",
+            "      ",
+        )
+    return lines
+
+
+def to_text(report: RigidityReport, style: Style | None = None) -> str:
+    """Return the report in the builders' language, with a final newline.
+
+    Parameters
+    ----------
+    report : RigidityReport
+    style : Style, optional
+        Colours and width; plain text of 100 columns when left out.
+    """
+    style = Style() if style is None else style
+    lines: list[str] = []
+    for section in (
+        _headline,
+        _bodies,
+        _motions,
+        _rigidity,
+        _weak_spots,
+        _unknown,
+        _findings,
+        _assumptions,
+    ):
+        lines += section(report, style)
+    return "\n".join(lines) + "\n"
