@@ -118,6 +118,9 @@ class Joint:
         Names of the mating ports, in the order of `parts`.
     offset : float
         How far apart the two features' lines are (m).
+    missing_stop : str
+        For an axle that can slide in a bore: the side along the joint's axis on which a stop is
+        missing, ``"+"``, ``"-"`` or ``"both"``; otherwise empty.
     """
 
     id: str
@@ -131,6 +134,7 @@ class Joint:
     provenance: str = ""
     ports: tuple[str, str] | None = None
     offset: float = 0.0
+    missing_stop: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point", readonly(self.point))

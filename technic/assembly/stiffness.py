@@ -1,0 +1,242 @@
+"""Stiffness tables: how stiff each kind of connection is, and how we know.
+
+A table is a TOML file of schema ``technic-stiffness/1``; the shipped one, `default.toml` of the
+package `calibration`, documents the format. Every value names its source, so that a report can say
+which of its numbers were measured and which were assumed.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import resources
+from math import isfinite
+from pathlib import Path
+from typing import Any, Final
+
+from technic.assembly.joint_types import HELD, JointType
+from technic.errors import InputError, SchemaError, UsageError
+from technic.geometry import Array, readonly
+
+__all__ = [
+    "MOTIONS",
+    "SCHEMA",
+    "ConnectionStiffness",
+    "StiffnessTable",
+    "StiffnessValue",
+    "default_table",
+    "read_table",
+]
+
+SCHEMA: Final = "technic-stiffness/1"
+
+MOTIONS: Final = ("axial", "shear", "spin", "tilt")
+"""Names of the values of a connection: N/m for the first two, N m/rad for the others."""
+
+_SLOTS: Final = {"axial": (0,), "shear": (1, 2), "spin": (3,), "tilt": (4, 5)}
+
+
+@dataclass(frozen=True, slots=True)
+class StiffnessValue:
+    """One stiffness with its origin.
+
+    Parameters
+    ----------
+    value : float
+        N/m, or N m/rad for spin and tilt; positive, or ``inf`` for rigid.
+    provenance : str
+        ``"paper"``, ``"assumed"``, ``"calibrated"`` or another name that the table's sources explain.
+    note : str
+    interval_95 : (float, float) or None
+        95 % interval of a calibrated value.
+    """
+
+    value: float
+    provenance: str
+    note: str = ""
+    interval_95: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectionStiffness:
+    """Joint type and stiffness of one kind of connection.
+
+    Parameters
+    ----------
+    connection : str
+        ``"male/female"``, e.g. ``"pin/pin_hole"``.
+    type : JointType
+    values : mapping of str to StiffnessValue
+        Keys from `MOTIONS`.
+    """
+
+    connection: str
+    type: JointType
+    values: Mapping[str, StiffnessValue]
+
+    def held(self, type_: JointType | None = None) -> Array:
+        """Return the held motions, (6,) bool, when the joint is of type `type_` (default: the
+        table's): those of the type, and the spin when the table gives it a stiffness.
+        """
+        mask = list(HELD[type_ or self.type])
+        if "spin" in self.values:
+            mask[3] = True
+        return readonly(mask, dtype=bool)
+
+    def vector(self) -> Array:
+        """Return the six stiffnesses [axial, shear, shear, spin, tilt, tilt], 0 where none is given."""
+        out = [0.0] * 6
+        for motion, entry in self.values.items():
+            for slot in _SLOTS[motion]:
+                out[slot] = entry.value
+        return readonly(out)
+
+    def provenance(self, held: Array) -> str:
+        """Return where the stiffnesses of the held motions come from, e.g. ``"paper"`` or
+        ``"paper (shear), assumed (axial, tilt)"``.
+        """
+        origins: dict[str, list[str]] = {}
+        for motion in MOTIONS:
+            if motion in self.values and held[_SLOTS[motion][0]]:
+                origins.setdefault(self.values[motion].provenance, []).append(motion)
+        if len(origins) == 1:
+            return next(iter(origins))
+        return ", ".join(f"{origin} ({', '.join(names)})" for origin, names in origins.items())
+
+
+@dataclass(frozen=True, slots=True)
+class StiffnessTable:
+    """Stiffness of every kind of connection.
+
+    Parameters
+    ----------
+    name : str
+    connections : mapping of str to ConnectionStiffness
+    sources : mapping of str to str
+        What each provenance means.
+    """
+
+    name: str
+    connections: Mapping[str, ConnectionStiffness]
+    sources: Mapping[str, str] = field(default_factory=dict)
+
+    def get(self, connection: str) -> ConnectionStiffness:
+        """Return the entry of a connection.
+
+        Raises
+        ------
+        UsageError
+            If the table has none.
+        """
+        try:
+            return self.connections[connection]
+        except KeyError:
+            known = ", ".join(sorted(self.connections))
+            raise UsageError(
+                f"stiffness table {self.name!r} has no connection {connection!r}; it has {known}"
+            ) from None
+
+
+@cache
+def default_table() -> StiffnessTable:
+    """Return the shipped table."""
+    resource = resources.files("calibration") / "tables" / "default.toml"
+    return parse_table(tomllib.loads(resource.read_text(encoding="utf-8")), "default.toml")
+
+
+def read_table(path: str | Path) -> StiffnessTable:
+    """Read a stiffness table.
+
+    Connections that the file leaves out are taken from the shipped table, which their provenance
+    shows.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is not TOML; SchemaError with every fault if it breaks the
+        schema.
+    """
+    try:
+        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"cannot read the stiffness table: {error.strerror}", path=path) from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"not a TOML file: {error}", path=path) from error
+    table = parse_table(data, path)
+    base = default_table()
+    return StiffnessTable(
+        table.name,
+        {**base.connections, **table.connections},
+        {**base.sources, **table.sources},
+    )
+
+
+def parse_table(data: Mapping[str, Any], path: str | Path) -> StiffnessTable:
+    """Return the table that parsed TOML describes; SchemaError with every fault."""
+    faults: list[str] = []
+    if data.get("schema") != SCHEMA:
+        faults.append(f"schema: expected {SCHEMA!r}, found {data.get('schema')!r}")
+    sources = data.get("sources", {})
+    if not isinstance(sources, dict) or not all(isinstance(v, str) for v in sources.values()):
+        faults.append("sources: expected a table of strings")
+        sources = {}
+    raw = data.get("connection", {})
+    if not isinstance(raw, dict) or not raw:
+        faults.append("connection: expected at least one table")
+        raw = {}
+    connections = {key: _connection(key, entry, faults) for key, entry in raw.items()}
+    if faults:
+        raise SchemaError(faults, path=path)
+    name = str(data.get("name", Path(path).stem))
+    return StiffnessTable(name, {k: v for k, v in connections.items() if v is not None}, sources)
+
+
+def _connection(key: str, entry: Any, faults: list[str]) -> ConnectionStiffness | None:
+    where = f'connection."{key}"'
+    if not isinstance(entry, dict):
+        faults.append(f"{where}: expected a table")
+        return None
+    try:
+        type_ = JointType(entry.get("type"))
+    except ValueError:
+        faults.append(f"{where}.type: {entry.get('type')!r} is not a joint type")
+        return None
+    for name in sorted(set(entry) - {"type", *MOTIONS}):
+        faults.append(f"{where}.{name}: unknown key")
+    values = {m: _value(f"{where}.{m}", entry[m], faults) for m in MOTIONS if m in entry}
+    found = {motion: value for motion, value in values.items() if value is not None}
+    held = HELD[type_]
+    for motion in MOTIONS:
+        if held[_SLOTS[motion][0]] and motion not in values:
+            faults.append(f"{where}.{motion}: missing, and a {type_} joint holds it")
+    return ConnectionStiffness(key, type_, found)
+
+
+def _value(where: str, entry: Any, faults: list[str]) -> StiffnessValue | None:
+    if not isinstance(entry, dict):
+        faults.append(f"{where}: expected {{ value = ..., provenance = ... }}")
+        return None
+    for name in sorted(set(entry) - {"value", "provenance", "note", "interval_95", "unit"}):
+        faults.append(f"{where}.{name}: unknown key")
+    value = entry.get("value")
+    if not _number(value) or not value > 0.0:
+        faults.append(f"{where}.value: expected a positive number, found {value!r}")
+        return None
+    provenance = entry.get("provenance")
+    if not isinstance(provenance, str) or not provenance:
+        faults.append(f"{where}.provenance: missing; say where the number comes from")
+        return None
+    interval = entry.get("interval_95")
+    if interval is not None:
+        good = isinstance(interval, list) and len(interval) == 2 and all(map(_number, interval))
+        if not good or not all(map(isfinite, interval)) or not interval[0] <= interval[1]:
+            faults.append(f"{where}.interval_95: expected [low, high], found {interval!r}")
+            return None
+        interval = (float(interval[0]), float(interval[1]))
+    return StiffnessValue(float(value), provenance, str(entry.get("note", "")), interval)
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -1,0 +1,182 @@
+"""From parts in their places to typed joints: what is in what, and what that holds.
+
+Pins turn in round bores, axles turn and slide in them unless stops hold them, axles sit fast in axle
+holes, balls swivel in sockets, one stud turns and several hold. Every joint names the key of the
+stiffness table that it got its numbers from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, Literal
+
+import numpy as np
+
+from technic.assembly.joint_types import JointType
+from technic.assembly.model import Finding, Joint, Part
+from technic.assembly.stiffness import ConnectionStiffness, StiffnessTable
+from technic.errors import UsageError
+from technic.geometry import Array, axes_from
+from technic.ldraw.findings import find
+from technic.ldraw.matching import Limits, Mating, match
+from technic.ldraw.placed import PlacedPorts, collect
+from technic.ldraw.stops import missing_stops
+
+__all__ = ["AxleSlide", "connect"]
+
+AxleSlide = Literal["held", "free"]
+
+_STUD: Final = "stud/tube"
+
+
+def connect(
+    parts: Sequence[Part],
+    table: StiffnessTable,
+    *,
+    axle_slide: AxleSlide = "held",
+    limits: Limits | None = None,
+) -> tuple[tuple[Joint, ...], tuple[Finding, ...]]:
+    """Return the joints between parts, and what is worth a sentence about them.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+    table : StiffnessTable
+    axle_slide : {"held", "free"}
+        Whether friction keeps a part where it is on an axle that it grips. When free, such a part
+        slides, and is no stop for the axle either.
+    limits : Limits, optional
+        How far from ideal features may be and still mate.
+
+    Returns
+    -------
+    joints : tuple of Joint
+        One for each pair of parts and line, in the order of the parts.
+    findings : tuple of Finding
+    """
+    if axle_slide not in ("held", "free"):
+        raise UsageError(f"axle_slide is 'held' or 'free', not {axle_slide!r}")
+    limits = limits or Limits()
+    placed = collect(parts)
+    matched = match(placed, limits)
+    missing = missing_stops(placed, matched.matings, gripped=axle_slide == "held", limits=limits)
+    by_pair: dict[tuple[int, int], list[Joint]] = {}
+    for group in _stud_groups(placed, matched.matings):
+        first = matched.matings[group[0]]
+        pair = _pair(placed, first)
+        joint_id = f"{parts[pair[0]].id}~{parts[pair[1]].id}@{len(by_pair.get(pair, [])) + 1}"
+        if first.connection == _STUD:
+            joint = _studs(placed, [matched.matings[k] for k in group], table, joint_id)
+        else:
+            joint = _joint(placed, first, table, joint_id, axle_slide, missing.get(group[0], ""))
+        by_pair.setdefault(pair, []).append(joint)
+    joints = tuple(joint for pair in sorted(by_pair) for joint in by_pair[pair])
+    return joints, find(placed, matched, joints, limits)
+
+
+def _pair(placed: PlacedPorts, mating: Mating) -> tuple[int, int]:
+    a, b = int(placed.part[mating.male]), int(placed.part[mating.female])
+    return (a, b) if a < b else (b, a)
+
+
+def _stud_groups(placed: PlacedPorts, matings: Sequence[Mating]) -> list[list[int]]:
+    """Return the matings of each joint: studs between the same two parts together, others alone."""
+    groups: list[list[int]] = []
+    studs: dict[tuple[int, int], list[int]] = {}
+    for k, mating in enumerate(matings):
+        pair = _pair(placed, mating)
+        if mating.connection == _STUD and pair in studs:
+            studs[pair].append(k)
+            continue
+        groups.append([k])
+        if mating.connection == _STUD:
+            studs[pair] = groups[-1]
+    return groups
+
+
+def _joint(
+    placed: PlacedPorts,
+    mating: Mating,
+    table: StiffnessTable,
+    joint_id: str,
+    axle_slide: AxleSlide,
+    missing: str,
+) -> Joint:
+    entry = table.get(mating.connection)
+    type_ = entry.type
+    if mating.connection == "axle/axle_hole":
+        type_ = JointType.FIXED if axle_slide == "held" else JointType.SLIDER
+    elif mating.connection == "axle/pin_hole":
+        type_ = JointType.CYLINDRICAL if missing else JointType.HINGE
+    axes = axes_from(mating.axis)
+    return _build(placed, mating, entry, type_, entry.vector(), joint_id, axes, missing)
+
+
+def _studs(
+    placed: PlacedPorts, matings: Sequence[Mating], table: StiffnessTable, joint_id: str
+) -> Joint:
+    """Return the joint of one or more studs between two parts.
+
+    Studs act as springs side by side between two faces: n of them add up, and about the middle of
+    the pattern their lever arms resist rotation: ``spin += k_shear r^2``, ``tilt += k_axial r^2``.
+    """
+    entry = table.get(_STUD)
+    single = entry.vector()
+    first = matings[0]
+    if len(matings) == 1:
+        type_ = JointType.HINGE
+        return _build(placed, first, entry, type_, single, joint_id, axes_from(first.axis), "")
+    points = np.array([mating.point for mating in matings])
+    middle = points.mean(axis=0)
+    axis = first.axis / np.linalg.norm(first.axis)
+    arms = points - middle
+    arms = arms - np.outer(arms @ axis, axis)
+    # Principal directions of the pattern make the rotational stiffness diagonal.
+    _, _, directions = np.linalg.svd(arms, full_matrices=True)
+    along = directions[0] - (directions[0] @ axis) * axis
+    along /= np.linalg.norm(along)
+    axes = np.array([axis, along, np.cross(axis, along)])
+    y, z = arms @ axes[1], arms @ axes[2]
+    stiffness = len(matings) * np.array(single)
+    stiffness[3] += single[1] * float(y @ y + z @ z)
+    stiffness[4] += single[0] * float(z @ z)
+    stiffness[5] += single[0] * float(y @ y)
+    joint = _build(placed, first, entry, JointType.FIXED, stiffness, joint_id, axes, "", middle)
+    return joint
+
+
+def _build(
+    placed: PlacedPorts,
+    mating: Mating,
+    entry: ConnectionStiffness,
+    type_: JointType,
+    stiffness: Array,
+    joint_id: str,
+    axes: Array,
+    missing: str,
+    point: Array | None = None,
+) -> Joint:
+    held = entry.held(type_)
+    if np.any(np.asarray(stiffness)[held] <= 0.0):
+        raise UsageError(
+            f"the stiffness table gives no value for a held motion of {entry.connection!r} "
+            f"as {type_} joint"
+        )
+    pair = _pair(placed, mating)
+    ports = (placed.name(mating.male), placed.name(mating.female))
+    if int(placed.part[mating.male]) != pair[0]:
+        ports = (ports[1], ports[0])
+    return Joint(
+        id=joint_id,
+        type=type_,
+        parts=pair,
+        point=mating.point if point is None else point,
+        axes=axes,
+        held=held,
+        stiffness=np.where(held, stiffness, 0.0),
+        connection=entry.connection,
+        provenance=entry.provenance(held),
+        ports=ports,
+        offset=mating.offset,
+        missing_stop=missing,
+    )
