@@ -53,6 +53,8 @@ class PieceKind(StrEnum):
     AXLE = "axle"
     AXLE_PERIMETER = "axle_perimeter"
     """The sides of a cross: an axle, or, in older files, an axle hole."""
+    RIB = "rib"
+    """A friction ridge: the pin around it is one with friction."""
     COLLAR = "collar"
     """A cylinder wider than a bore seen from outside."""
     STUD = "stud"
@@ -271,10 +273,11 @@ def _pins(line: _Line) -> list[Feature]:
     """Return the pins on a line, long ones divided; a middle made of raw shapes is filled."""
     out = []
     ends: list[tuple[float, float, bool, bool]] = []
+    ribs = [(low + high) / 2.0 for low, high in _spans(line, PieceKind.RIB)]
     for piece, low, high, along in line.spans:
         if piece.kind not in (PieceKind.PIN, PieceKind.PIN_FRICTION):
             continue
-        friction = piece.kind is PieceKind.PIN_FRICTION
+        friction = piece.kind is PieceKind.PIN_FRICTION or any(low < s < high for s in ribs)
         for a, b in _divide(low, high):
             if not any(abs(a - c) < JOIN and abs(b - d) < JOIN for c, d, _, _ in ends):
                 ends.append((a, b, along, friction))
@@ -375,6 +378,7 @@ def to_ports(features: Iterable[Feature]) -> tuple[Port, ...]:
         axis = ((feature.end - feature.start) / max(feature.length, 1e-9)).round(3) + 0.0
         return (*middle, *axis)
 
+    features = tuple(features)
     ports = []
     for kind, name in _NAMES.items():
         chosen = sorted((f for f in features if f.kind is kind), key=order)

@@ -71,6 +71,12 @@ RULES: Final[dict[str, tuple[Rule, ...]]] = {
     **{f"connect{n}": (_PIN,) for n in ("", 2, 5, 6, 7, 8, 10)},
     "connect3": (_HALF_PIN,),
     "connect4": (_HALF_PIN,),
+    # the tip of a pin, in halves; y points back into the pin
+    **{f"connectcollar{n}": ((K.PIN, 20.0, 0.0),) for n in range(1, 6)},
+    # a quarter of the slit middle of a long pin
+    **{f"connectslit{n}": ((K.SHANK, -9.0, 9.0),) for n in range(1, 5)},
+    **{f"confricrib{n}": ((K.RIB, -1.0, 1.0),) for n in range(1, 5)},
+    "fric": ((K.RIB, -1.0, 1.0),),
     **{f"confric{n}": (_PIN_FRICTION,) for n in ("", 2, 4, 5, 6, 8, 9, 10, 11, 12)},
     "confric3": ((K.PIN_FRICTION, 0.0, -40.0),),
     "joint8ball": ((K.BALL, 0.0, -8.0),),
@@ -111,7 +117,7 @@ class Occurrence:
     offsets : (n, 3) ndarray
         In LDU, in the coordinates of the file.
     inverted : (n,) ndarray of bool
-        Seen from inside: an odd number of ``INVERTNEXT`` and mirrorings.
+        Seen from inside: an odd number of ``INVERTNEXT``.
     """
 
     matrices: Array
@@ -148,7 +154,8 @@ class Walker:
         count = 0
         for reference in self.library.file(key).references:
             matrix, offset = reference.matrix, reference.offset
-            flip = reference.inverted ^ bool(np.linalg.det(matrix) < 0.0)
+            # a mirrored cylinder still shows its outside: only INVERTNEXT turns it inside out
+            flip = reference.inverted
             if _interesting(reference.name):
                 found = {
                     reference.name: Occurrence(
@@ -209,9 +216,12 @@ def _pieces(occurrences: dict[str, Occurrence], matrix: Array, offset: Array) ->
             elif sphere:
                 out += _sphere(m, t, bool(inverted))
             else:
+                axis = m[:, 1]
+                share = 0.25 if name.startswith("connectslit") else 1.0
                 for kind, low, high in RULES[name.removesuffix(".dat")]:
-                    axis = m[:, 1]
-                    out.append(Piece(kind, t + low * axis, t + high * axis, inward=bool(inverted)))
+                    out.append(
+                        Piece(kind, t + low * axis, t + high * axis, share, bool(inverted))
+                    )
     return out
 
 
