@@ -24,9 +24,10 @@ __all__ = ["Feature", "Piece", "PieceKind", "build_features", "to_ports"]
 
 PITCH_LDU: Final = 20.0
 
-SAME_LINE: Final = 0.3
+SAME_LINE: Final = 1.0
 """Pieces lie on one line when they are closer than this (LDU): part files round to 0.01, posed
-subfiles to 0.1."""
+subfiles to 0.1, and mirrored quarters of one hole are up to 0.6 apart. Different holes are not closer
+than 8."""
 
 JOIN: Final = 1.0
 """Pieces of one bore or shaft touch or overlap; chamfers and edges leave gaps of at most this."""
@@ -44,6 +45,8 @@ class PieceKind(StrEnum):
     """One end of a pin hole; runs from the surface inwards."""
     WALL = "wall"
     """A cylinder of a pin's radius seen from inside."""
+    TUBE_WALL = "tube_wall"
+    """The inside of a stud's tube: lengthens a hole, but is none by itself."""
     AXLE_HOLE = "axle_hole"
     PIN = "pin"
     """A pin, from its base to its tip."""
@@ -147,6 +150,11 @@ def _lines(pieces: Iterable[Piece]) -> list[_Line]:
             buckets[key].append(found)
         a, b = float(found.direction @ piece.start), float(found.direction @ piece.end)
         found.spans.append((piece, min(a, b), max(a, b), b > a))
+    for line in lines:
+        # mirrored quarters lie around the true line
+        starts = np.array([piece.start for piece, *_ in line.spans])
+        feet = starts - np.outer(starts @ line.direction, line.direction)
+        line.foot = np.unique(feet.round(3), axis=0).mean(axis=0)
     return lines
 
 
@@ -199,65 +207,90 @@ def _pin_holes(line: _Line) -> list[tuple[float, float]]:
         if piece.kind is PieceKind.MOUTH
     ]
     walls = _rounded_walls(line, PieceKind.WALL, 0.7)
-    # a bore ends where one hole's mouth meets the next one's
-    opening = sorted({round(low, 2) for low, _, along in mouths if along})
-    closing = sorted({round(high, 2) for _, high, along in mouths if not along})
-    opening += [round(low, 2) for low, _ in whole]
-    closing += [round(high, 2) for _, high in whole]
+    opening = [low for low, _, along in mouths if along] + [low for low, _ in whole]
+    closing = [high for _, high, along in mouths if not along] + [high for _, high in whole]
     solid = whole + walls + [(low, high) for low, high, _ in mouths]
     # two mouths that face each other belong together when at most a pitch lies between them:
     # the wall may be raw polygons where another bore crosses
     for low in opening:
         later = [high for high in closing if low < high <= low + PITCH_LDU + JOIN]
-        if later and not any(low < other < min(later) for other in opening):
+        if later and not any(low + JOIN < other < min(later) for other in opening):
             solid.append((low, min(later)))
+    tubes = _spans(line, PieceKind.TUBE_WALL)
     out = []
-    for low, high in _union(solid, JOIN):
-        cuts = [low]
-        cuts += [
-            s
+    for low, high in _union(solid + (tubes if walls else []), JOIN):
+        # a bore ends where one hole's mouth meets the next one's
+        inner = {
+            round(s, 2)
             for s in opening
             if low + 3.0 < s < high - 3.0 and any(abs(s - c) < JOIN for c in closing)
-        ]
-        cuts.append(high)
-        out += [(a, b) for a, b in zip(cuts, cuts[1:], strict=False)]
-    known = _union(whole + [(low, high) for low, high, _ in mouths], JOIN)
-    return [
-        (low, high)
-        for low, high in out
-        if _covered(low, high, known) > 0.0 or high - low >= MIN_RAW_BORE
-    ]
+        }
+        cuts = [low, *sorted(inner), high]
+        for a, b in zip(cuts, cuts[1:], strict=False):
+            opens = any(abs(s - a) < JOIN for s in opening)
+            closes = any(abs(s - b) < JOIN for s in closing)
+            if opens or closes:
+                out.append(_nominal(a, b, opens, closes))
+            elif b - a >= MIN_RAW_BORE and _covered(a, b, walls) > 0.0:
+                out.append((a, b))
+    return out
 
 
-MIN_RAW_BORE: Final = 3.0
-"""Shortest round bore without a hole primitive that counts as a pin hole (plates have 8 LDU)."""
+def _nominal(low: float, high: float, opens: bool, closes: bool) -> tuple[float, float]:
+    """Return a hole with one mouth in its nominal length, measured from that mouth.
+
+    Behind its wall such a hole opens into a recess of any depth, or ends blind; what a pin fills is
+    half a pitch or whole ones.
+    """
+    if opens and closes:
+        return low, high
+    length = high - low
+    half = PITCH_LDU / 2.0
+    steps = max(1, round(length / half))
+    if abs(length - steps * half) <= NOMINAL_SLACK and (steps == 1 or steps % 2 == 0):
+        length = steps * half
+    return (low, low + length) if opens else (high - length, high)
 
 
-def _axle_features(line: _Line, collars: bool) -> list[Feature]:
-    """Return axles and axle holes on a line; the sides of a cross are told apart by neighbours."""
+NOMINAL_SLACK: Final = 2.5
+"""A hole with one mouth is taken for a nominal one when its wall is at most this much shorter or longer
+(LDU): the missing counterbore has 2."""
+
+MIN_RAW_BORE: Final = 6.0
+"""Shortest round bore without a hole primitive that counts as a pin hole: plates have 8 LDU, recesses
+for studs and collars 2 to 5."""
+
+
+def _axle_features(line: _Line) -> list[Feature]:
+    """Return axles and axle holes on a line; the sides of a cross are told apart by neighbours.
+
+    Sides alone, with no end in sight, are a rod of cross-shaped section between other shapes.
+    """
     holes = _spans(line, PieceKind.AXLE_HOLE)
     axles = _spans(line, PieceKind.AXLE)
-    for piece, low, high, _ in line.spans:
-        if piece.kind is not PieceKind.AXLE_PERIMETER:
-            continue
+    sides = [
+        (low, high, piece.inward)
+        for piece, low, high, _ in line.spans
+        if piece.kind is PieceKind.AXLE_PERIMETER
+    ]
+    runs = _union([(low, high) for low, high, _ in sides] + axles, AXLE_NOTCH)
+    for low, high, inward in sides:
         near_axle = any(
-            a <= high + JOIN and b >= low - JOIN for a, b in _spans(line, PieceKind.AXLE)
+            a <= low and high <= b and any(a <= c and d <= b for c, d in axles) for a, b in runs
         )
-        near_hole = any(
-            a <= high + JOIN and b >= low - JOIN for a, b in _spans(line, PieceKind.AXLE_HOLE)
-        )
-        if near_axle == near_hole:
-            (holes if piece.inward else axles).append((low, high))
-        else:
-            (axles if near_axle else holes).append((low, high))
+        near_hole = any(a <= high + JOIN and b >= low - JOIN for a, b in holes)
+        if near_hole and (inward or not near_axle):
+            holes.append((low, high))
+        elif near_axle:
+            axles.append((low, high))
+        elif inward:
+            holes.append((low, high))
     out = []
     for low, high in _union(holes, JOIN):
         for a, b in _divide(low, high):
             out.append(Feature(PortKind.AXLE_HOLE, line.at(a), line.at(b)))
     for low, high in _union(axles, AXLE_NOTCH):
         out.append(Feature(PortKind.AXLE, line.at(low), line.at(high)))
-        if not collars:
-            continue
         for a, b in _union(_spans(line, PieceKind.COLLAR), 0.1):
             # a collar belongs to the axle it touches; a long one is a hub, not a stop
             if b - a <= MAX_STOP and a <= high + JOIN and b >= low - JOIN:
@@ -270,10 +303,9 @@ MAX_STOP: Final = 8.0
 
 
 def _pins(line: _Line) -> list[Feature]:
-    """Return the pins on a line, long ones divided; a middle made of raw shapes is filled."""
-    out = []
-    ends: list[tuple[float, float, bool, bool]] = []
+    """Return the pins on a line, long ones divided; a shank made of raw shapes lengthens them."""
     ribs = [(low + high) / 2.0 for low, high in _spans(line, PieceKind.RIB)]
+    ends: list[tuple[float, float, bool, bool]] = []
     for piece, low, high, along in line.spans:
         if piece.kind not in (PieceKind.PIN, PieceKind.PIN_FRICTION):
             continue
@@ -281,20 +313,50 @@ def _pins(line: _Line) -> list[Feature]:
         for a, b in _divide(low, high):
             if not any(abs(a - c) < JOIN and abs(b - d) < JOIN for c, d, _, _ in ends):
                 ends.append((a, b, along, friction))
-    shanks = _union(
-        _rounded_walls(line, PieceKind.SHANK, 0.5) + [(a, b) for a, b, _, _ in ends], JOIN
-    )
+    if not ends:
+        return []
     ends.sort(key=lambda end: end[0])
+    round_ = _rounded_walls(line, PieceKind.SHANK, 0.5)
+    taken = _union([(a, b) for a, b, _, _ in ends], JOIN)
+    extra: list[tuple[float, float, bool, bool]] = []
     for low, high, along, friction in ends:
-        start, end = (low, high) if along else (high, low)
-        out.append(Feature(PortKind.PIN, line.at(start), line.at(end), friction))
-    for left, right in zip(ends, ends[1:], strict=False):
-        gap = right[0] - left[1]
-        # bases face each other over one or more pitches, with a shank between them
-        if gap > PITCH_LDU / 2 and _covered(left[1], right[0], shanks) > 0.7:
-            for a, b in _divide(left[1], right[0]):
-                out.append(Feature(PortKind.PIN, line.at(a), line.at(b), left[3] or right[3]))
+        # from the base on, away from the tip; up to the next pin on the line, if there is one
+        base, sign = (low, -1.0) if along else (high, 1.0)
+        ahead = [sign * (s - base) for a, b in taken for s in (a, b) if sign * (s - base) > JOIN]
+        reach = sorted(
+            (sign * (a - base), sign * (b - base)) if sign > 0 else (base - b, base - a)
+            for a, b in round_
+        )
+        limit = min(ahead) if ahead else max([b for _, b in reach], default=0.0)
+        steps = round(limit / PITCH_LDU)
+        if steps < 1 or any(
+            -JOIN < sign * (s - base) < JOIN
+            for a, b in taken
+            for s in (a, b)
+            if not (abs(a - low) < JOIN or abs(b - high) < JOIN)
+        ):
+            continue
+        if _covered(0.0, limit, [(max(a, 0.0), b) for a, b in reach if b > 0.0]) < SHANK_SHARE:
+            continue
+        full = limit if ahead else steps * PITCH_LDU
+        if abs(limit - steps * PITCH_LDU) > 3.0:
+            continue
+        for k in range(steps):
+            a = base + sign * full * k / steps
+            b = base + sign * full * (k + 1) / steps
+            extra.append((min(a, b), max(a, b), along, friction))
+    for end in extra:
+        if not any(abs(end[0] - c) < JOIN and abs(end[1] - d) < JOIN for c, d, _, _ in ends):
+            ends.append(end)
+    out = []
+    for low, high, along, friction in ends:
+        start, end_ = (low, high) if along else (high, low)
+        out.append(Feature(PortKind.PIN, line.at(start), line.at(end_), friction))
     return out
+
+
+SHANK_SHARE: Final = 0.65
+"""Least share of a pin's middle that must be round shank (collars and slits take the rest)."""
 
 
 def _points(pieces: Iterable[Piece]) -> list[Feature]:
@@ -338,7 +400,7 @@ def build_features(pieces: Iterable[Piece]) -> tuple[Feature, ...]:
     point_kinds = (PieceKind.STUD, PieceKind.TUBE, PieceKind.BALL, PieceKind.SOCKET)
     out = _points(pieces)
     for line in _lines(piece for piece in pieces if piece.kind not in point_kinds):
-        axial = _axle_features(line, collars=True)
+        axial = _axle_features(line)
         taken = _union(
             [
                 (float(line.direction @ f.start), float(line.direction @ f.end))

@@ -42,7 +42,7 @@ RULES: Final[dict[str, tuple[Rule, ...]]] = {
     **{f"peghole{n}": ((K.MOUTH, 0.0, 2.0),) for n in ("", 2, 3, 4, 5, 6)},
     "connhole": ((K.HOLE, -10.0, 10.0),),
     "connhol2": ((K.HOLE, -10.0, 10.0),),
-    "connhol3": ((K.HOLE, -10.0, 10.0),),
+    "connhol3": ((K.MOUTH, -10.0, -8.0), (K.WALL, -8.0, 8.0)),
     "beamhole": ((K.HOLE, -10.0, 10.0),),
     "beamhol2": ((K.HOLE, -5.0, 5.0),),
     **{
@@ -83,11 +83,12 @@ RULES: Final[dict[str, tuple[Rule, ...]]] = {
     **{f"joint8socket{n}": ((K.SOCKET, 0.0, -8.0),) for n in (1, 2, 3)},
     **{
         f"stud{n}": ((K.STUD, 0.0, -4.0),)
-        for n in ("", "2", "2a", "a", "6", "6a", "10", "13", "15", "17a", "26", "el", "xa", "p01")
+        for n in ("", "2", "2a", "a", "6", "6a", "10", "13", "15", "17a", "26", "el", "p01")
     },
+    **{f"stud{n}": ((K.TUBE, 0.0, -4.0),) for n in ("3", "3a", "xa")},
     **{
-        f"stud{n}": ((K.TUBE, 0.0, -4.0),)
-        for n in ("3", "3a", "4", "4a", "4o", "4od", "4s", "4h", "16")
+        f"stud{n}": ((K.TUBE, 0.0, -4.0), (K.TUBE_WALL, 0.0, -4.0))
+        for n in ("4", "4a", "4o", "4od", "4s", "4h", "16")
     },
 }
 """Pieces of each primitive, by its name without ``.dat``."""
@@ -96,7 +97,8 @@ _CYLINDER = re.compile(r"^(?:48/|8/)?(\d+)-(\d+)cyl[ioc]2?\.dat$")
 _SPHERE = re.compile(r"^(?:48/|8/)?(\d+)-8sphe\.dat$")
 
 PIN_RADIUS: Final = 6.0
-BALL_RADIUS: Final = 8.0
+BALL_RADII: Final = (8.0, 12.8)
+"""Tow balls, and the balls of suspension parts (LDU)."""
 COLLAR_RADII: Final = (7.0, 9.5)
 RADIUS_SLACK: Final = 0.3
 
@@ -219,9 +221,7 @@ def _pieces(occurrences: dict[str, Occurrence], matrix: Array, offset: Array) ->
                 axis = m[:, 1]
                 share = 0.25 if name.startswith("connectslit") else 1.0
                 for kind, low, high in RULES[name.removesuffix(".dat")]:
-                    out.append(
-                        Piece(kind, t + low * axis, t + high * axis, share, bool(inverted))
-                    )
+                    out.append(Piece(kind, t + low * axis, t + high * axis, share, bool(inverted)))
     return out
 
 
@@ -241,10 +241,9 @@ def _cylinder(m: Array, t: Array, share: float, inverted: bool) -> list[Piece]:
 def _sphere(m: Array, t: Array, inverted: bool) -> list[Piece]:
     """Return a ball or a socket for a sphere of a ball joint's radius."""
     radii = np.linalg.norm(m, axis=0)
-    if np.abs(radii - BALL_RADIUS).max() > RADIUS_SLACK:
+    if not any(np.abs(radii - known).max() <= RADIUS_SLACK for known in BALL_RADII):
         return []
-    axis = m[:, 1] / radii[1]
-    return [Piece(K.SOCKET if inverted else K.BALL, t + axis, t - axis)]
+    return [Piece(K.SOCKET if inverted else K.BALL, t + m[:, 1], t - m[:, 1])]
 
 
 def features_from_primitives(walker: Walker, number: str) -> tuple[Feature, ...] | None:
