@@ -272,7 +272,7 @@ def _expand(document: Document, surveyor: Surveyor) -> list[_Leaf]:
             continue
         reference = item.reference
         color = frame.color if reference.color == INHERIT else reference.color
-        path = f"{frame.path}/{item.target.name}"
+        path = f"{frame.path}/{reference.name}"
         if item.occurrence > 1:
             path += f"#{item.occurrence}"
         flexible = frame.flexible

@@ -228,14 +228,16 @@ def _decode(raw: bytes) -> Text:
             except UnicodeDecodeError:
                 if encoding != "utf-8":
                     raise
-                return Text(raw.decode("latin-1"), "latin-1")
+                return Text(raw[len(bom) :].decode("latin-1"), "latin-1", bom)
     # UTF-16 without a mark: nearly every second byte of LDraw text is then zero.
     head = raw[:2000]
     if len(head) >= 4 and len(raw) % 2 == 0:
-        for zeros, encoding in ((head[1::2], "utf-16-le"), (head[0::2], "utf-16-be")):
-            others = head[0::2] if zeros is head[1::2] else head[1::2]
-            if zeros.count(0) > 0.9 * len(zeros) and others.count(0) < 0.1 * len(others):
-                return Text(raw.decode(encoding), encoding)
+        even, odd = head[0::2].count(0), head[1::2].count(0)
+        many, few = 0.45 * len(head), 0.05 * len(head)
+        if odd > many and even < few:
+            return Text(raw.decode("utf-16-le"), "utf-16-le")
+        if even > many and odd < few:
+            return Text(raw.decode("utf-16-be"), "utf-16-be")
     try:
         return Text(raw.decode("utf-8"), "utf-8")
     except UnicodeDecodeError:
@@ -266,10 +268,12 @@ def number_of(name: str) -> str:
 
 # --- parsing ----------------------------------------------------------------------------------
 _NUMBER: Final = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+_COLOR: Final = r"\d{1,10}|0[xX][0-9a-fA-F]{1,8}"
 _REFERENCE: Final = re.compile(
-    rf"[ \t]*1[ \t]+(\d+|0[xX][0-9a-fA-F]+)[ \t]+({_NUMBER}(?:[ \t]+{_NUMBER}){{11}})[ \t]+(\S.*)",
+    rf"1[ \t]+({_COLOR})[ \t]+({_NUMBER}(?:[ \t]+{_NUMBER}){{11}})[ \t]+(\S.*)",
     re.ASCII | re.DOTALL,
 )
+_WHITE: Final = re.compile(r"[ \t]+")
 _FIELDS: Final = ("colour", "x", "y", "z", "a", "b", "c", "d", "e", "f", "g", "h", "i")
 
 
@@ -299,7 +303,7 @@ def parse_line(text: str, number: int, path: Path) -> Line:
                 return Reference(
                     number,
                     text,
-                    int(color, 16) if color[:2] in ("0x", "0X") else int(color[:12]),
+                    int(color, 16) if color[:2] in ("0x", "0X") else int(color),
                     (values[0], values[1], values[2]),
                     tuple(values[3:]),  # type: ignore[arg-type]  # the pattern has 12 numbers
                     name,
@@ -308,7 +312,7 @@ def parse_line(text: str, number: int, path: Path) -> Line:
     if kind in ("2", "3", "4", "5"):
         return Drawing(number, text)
     raise InputError(
-        f"line type {_short(stripped.split()[0])} is unknown; LDraw lines begin with 0 to 5",
+        f"line type {_short(_WHITE.split(stripped)[0])} is unknown; LDraw lines begin with 0 to 5",
         path=path,
         line=number,
         remedy="Is this an LDraw file? If so, delete the line or make it a comment (0 // ...).",
@@ -340,11 +344,11 @@ def _short(token: str) -> str:
 
 def _reference_error(text: str, number: int, path: Path) -> InputError:
     """Say what is wrong with a line of type 1."""
-    tokens = text.split()
+    tokens = _WHITE.split(text)
     remedy = "Correct the line in a text editor, or save the model again in its editor."
     for field, token in zip(_FIELDS, tokens[1:14], strict=False):
         if field == "colour":
-            if not re.fullmatch(r"\d+|0[xX][0-9a-fA-F]+", token, re.ASCII):
+            if not re.fullmatch(_COLOR, token, re.ASCII):
                 return InputError(
                     f"colour {_short(token)} is not a colour code",
                     path=path,
