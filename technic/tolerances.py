@@ -29,6 +29,10 @@ AXIAL_OVERLAP: Final = 4.0 * LDU
 SHORT_FEATURE_SHARE: Final = 0.75
 """Features shorter than `AXIAL_OVERLAP` mate when they share this part of the shorter length."""
 
+STUD_OFFSET: Final = 2.0 * LDU
+"""A stud sits in a tube or beside it, 10 or 14.14 LDU from its middle; this far off at most, half of
+what separates the two."""
+
 TOUCH: Final = 1.0 * LDU
 """Two parts on one axle touch when the gap between them is at most this."""
 
@@ -80,11 +84,16 @@ PIVOT_CLEAR: Final = 5e-2
 """A body is eliminated only when its other singular values exceed this, so that errors grow by at
 most a factor of twenty per step; unclear bodies go into the dense core."""
 
-RITZ_LIMIT: Final = 0.1
-"""Core vectors with singular values below this enter the Rayleigh-Ritz step: thirty times the cut."""
+WHEEL_BALANCE: Final = 1.0 * LDU
+"""A wheel's centre of mass lies this close to its axle: real wheels and gears are exact, a lever's
+centre of mass is at least a quarter of a pitch away."""
 
-RITZ_EXTRA: Final = 4
-"""Further core vectors that enter it, so that the smallest value kept is seen."""
+WHEEL_ROUNDNESS: Final = 0.05
+"""Relative spread of the second moments of mass across the axle up to which a body is round; a 2L beam
+about its middle has 0.7, a gear with an axle hole below 0.01."""
+
+SAME_LINE: Final = 1.0 * LDU
+"""Joints whose lines are this close share a line."""
 
 # --- numerics ---------------------------------------------------------------------------------
 EIGEN_RESIDUAL: Final = 1e-6

@@ -14,7 +14,7 @@ from functools import cache
 from importlib import resources
 from math import isfinite
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeGuard
 
 from technic.assembly.joint_types import HELD, JointType
 from technic.errors import InputError, SchemaError, UsageError
@@ -199,7 +199,7 @@ def _connection(key: str, entry: Any, faults: list[str]) -> ConnectionStiffness 
         faults.append(f"{where}: expected a table")
         return None
     try:
-        type_ = JointType(entry.get("type"))
+        type_ = JointType(str(entry.get("type")))
     except ValueError:
         faults.append(f"{where}.type: {entry.get('type')!r} is not a joint type")
         return None
@@ -230,13 +230,15 @@ def _value(where: str, entry: Any, faults: list[str]) -> StiffnessValue | None:
         return None
     interval = entry.get("interval_95")
     if interval is not None:
-        good = isinstance(interval, list) and len(interval) == 2 and all(map(_number, interval))
-        if not good or not all(map(isfinite, interval)) or not interval[0] <= interval[1]:
+        good = (
+            isinstance(interval, list) and len(interval) == 2 and all(_number(x) for x in interval)
+        )
+        if not good or not all(isfinite(x) for x in interval) or not interval[0] <= interval[1]:
             faults.append(f"{where}.interval_95: expected [low, high], found {interval!r}")
             return None
         interval = (float(interval[0]), float(interval[1]))
     return StiffnessValue(float(value), provenance, str(entry.get("note", "")), interval)
 
 
-def _number(value: Any) -> bool:
+def _number(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool)

@@ -141,8 +141,7 @@ def _studs(
     stiffness[3] += single[1] * float(y @ y + z @ z)
     stiffness[4] += single[0] * float(z @ z)
     stiffness[5] += single[0] * float(y @ y)
-    joint = _build(placed, first, entry, JointType.FIXED, stiffness, joint_id, axes, "", middle)
-    return joint
+    return _build(placed, first, entry, JointType.FIXED, stiffness, joint_id, axes, "", middle)
 
 
 def _build(

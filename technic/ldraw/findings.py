@@ -6,15 +6,15 @@ in one part, holes that line up without a pin, and pieces that are joined to not
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from technic.assembly.model import Finding, FindingKind, Joint
+from technic.geometry import Array
 from technic.ldraw.matching import MATES, Limits, Matched
 from technic.ldraw.placed import Indices, PlacedPorts, near_pairs, overlap
 from technic.parts.definition import PortKind
@@ -25,6 +25,9 @@ __all__ = ["find"]
 
 _ENDS: Final = (PortKind.PIN, PortKind.AXLE, PortKind.BALL)
 """Ports that are made to enter something; studs without a brick on them are no news."""
+
+_FAR: Final = 2.0 * PITCH
+"""A port further away than this has nothing to do with a loose piece."""
 
 _WORDS: Final = {
     PortKind.PIN: "pin end",
@@ -52,7 +55,7 @@ def find(
     limits : Limits
         With which the matching was done.
     """
-    reasons = _open_ends(placed, matched, limits)
+    reasons = _open_ends(placed, matched, joints, limits)
     bare = _bare_holes(placed, matched, joints)
     found = [
         *_off_grid(placed, joints),
@@ -69,7 +72,11 @@ def _title(placed: PlacedPorts, part: int) -> str:
     """Return how a sentence calls a part: name, number and place in the file."""
     this = placed.parts[part]
     name = f"{this.name} ({this.number})" if this.number and this.number != this.name else this.name
-    return f"{name}, line {this.source.line}" if this.source is not None else name
+    if this.source is None:
+        return name
+    _, _, submodel = this.source.submodel.rpartition("/")
+    nested = f" of {submodel}" if "/" in this.source.submodel else ""
+    return f"{name}, line {this.source.line}{nested}"
 
 
 def _off_grid(placed: PlacedPorts, joints: Sequence[Joint]) -> Iterator[Finding]:
@@ -80,13 +87,16 @@ def _off_grid(placed: PlacedPorts, joints: Sequence[Joint]) -> Iterator[Finding]
             yield Finding(FindingKind.OFF_GRID, message, joint.parts, joint.offset)
 
 
-def _open_ends(placed: PlacedPorts, matched: Matched, limits: Limits) -> dict[int, Finding]:
+def _open_ends(
+    placed: PlacedPorts, matched: Matched, joints: Sequence[Joint], limits: Limits
+) -> dict[int, Finding]:
     """Return one finding for each port that is made to enter something and does not."""
     ends = placed.of_kind(*_ENDS)
     ends = ends[~np.isin(ends, list(matched.used))]
     refused = dict(reversed(matched.refused))
+    joined = frozenset(pair for joint in joints for pair in (joint.parts, joint.parts[::-1]))
     near = _near_misses(placed, ends, matched, limits)
-    distance = _nearest(placed, ends)
+    distance = _nearest(placed, ends, joined)
     found: dict[int, Finding] = {}
     for end in map(int, ends):
         part = int(placed.part[end])
@@ -143,26 +153,29 @@ def _near_misses(
     return near
 
 
-def _nearest(placed: PlacedPorts, ends: Indices) -> dict[int, float]:
-    """Return for each end the distance (m) to the nearest feature of another part that it could
-    enter, if there is one within a pitch.
+def _apart(placed: PlacedPorts, pairs: Indices) -> Array:
+    """Return the distance (m) from the first port's line to the second port's middle, (m,)."""
+    i, j = pairs[:, 0], pairs[:, 1]
+    between = placed.position[j] - placed.position[i]
+    along = np.einsum("ij,ij->i", between, placed.axis[i])
+    along = np.clip(along, -placed.half[i], placed.half[i])
+    return np.asarray(np.linalg.norm(between - along[:, None] * placed.axis[i], axis=1))
+
+
+def _nearest(
+    placed: PlacedPorts, ends: Indices, joined: frozenset[tuple[int, int]]
+) -> dict[int, float]:
+    """Return for each end the distance (m) to the nearest port that it could enter, if there is one
+    within a pitch, in a part that its own part is not joined to.
     """
     found: dict[int, float] = {}
     for kind in _ENDS:
         chosen = ends[placed.kind[ends] == str(kind)]
-        females = placed.of_kind(*_females(kind))
-        if not len(chosen) or not len(females):
-            continue
-        tree = cKDTree(placed.position[females])
-        half = placed.half[chosen]
-        near = tree.query_ball_point(placed.position[chosen], half + PITCH)
-        for end, hits in zip(map(int, chosen), near, strict=True):
-            others = [k for k in females[hits] if placed.part[k] != placed.part[end]]
-            if others:
-                delta = placed.position[others] - placed.position[end]
-                along = np.clip(delta @ placed.axis[end], -placed.half[end], placed.half[end])
-                delta = delta - along[:, None] * placed.axis[end]
-                found[end] = float(np.linalg.norm(delta, axis=1).min())
+        pairs = near_pairs(placed, chosen, placed.of_kind(*_females(kind)), PITCH)
+        for (end, other), distance in zip(pairs.tolist(), _apart(placed, pairs), strict=True):
+            parts = (int(placed.part[end]), int(placed.part[other]))
+            if distance <= PITCH and parts not in joined:
+                found[end] = min(found.get(end, np.inf), float(distance))
     return found
 
 
@@ -238,12 +251,13 @@ def _loose(
         return
     ends = np.array([joint.parts for joint in joints], dtype=np.intp).reshape(-1, 2)
     graph = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(number, number))
-    _, label = connected_components(graph, directed=False)
+    label = connected_components(graph, directed=False)[1].astype(np.intp)
     sizes = np.bincount(label)
     if len(sizes) == 1:
         return
     # The biggest group is the model; the earliest one when several are equally big.
     main = label[int(np.argmax(sizes[label]))]
+    nearest = _nearest_outside(placed, label)
     for group in dict.fromkeys(label.tolist()):
         if group == main and sizes[group] > 1:
             continue
@@ -251,7 +265,7 @@ def _loose(
         who = _title(placed, members[0])
         if len(members) > 1:
             who = f"{len(members)} parts that hold each other ({who} and others)"
-        why, distance = _why_loose(placed, members, reasons, bare)
+        why, distance = _why_loose(placed, members, reasons, bare, nearest.get(group))
         message = f"{who}: joined to nothing else; {why}"
         yield Finding(FindingKind.LOOSE, message, members, distance)
 
@@ -261,6 +275,7 @@ def _why_loose(
     members: tuple[int, ...],
     reasons: dict[int, Finding],
     bare: dict[tuple[int, int], Finding],
+    nearest: tuple[float, str] | None,
 ) -> tuple[str, float | None]:
     inside = set(members)
     if all(not placed.of_part(part) for part in members):
@@ -282,24 +297,27 @@ def _why_loose(
     if misses:
         best = min(misses, key=lambda finding: (finding.distance or 0.0, finding.message))
         return best.message, best.distance
-    return _nearest_outside(placed, members)
-
-
-def _nearest_outside(placed: PlacedPorts, members: Iterable[int]) -> tuple[str, float | None]:
-    """Return how far the nearest feature is that one of the group's could mate with."""
-    inside = np.isin(placed.part, list(members))
-    best: tuple[float, str] | None = None
-    for male, female in MATES:
-        for own, other in ((male, female), (female, male)):
-            here = np.flatnonzero(inside & (placed.kind == str(own)))
-            there = np.flatnonzero(~inside & (placed.kind == str(other)))
-            if len(here) and len(there):
-                near, _ = cKDTree(placed.position[there]).query(placed.position[here])
-                candidate = (float(near.min()), _WORDS[other])
-                best = candidate if best is None else min(best, candidate)
-    if best is None or best[0] > 2.0 * PITCH:
+    if nearest is None:
         return "nothing there", None
-    return f"the nearest {best[1]} is {_ldu(best[0])} away", best[0]
+    return f"the nearest {nearest[1]} is {_ldu(nearest[0])} away", nearest[0]
+
+
+def _nearest_outside(placed: PlacedPorts, label: Indices) -> dict[int, tuple[float, str]]:
+    """Return for each group how far (m) the nearest port of another group is that one of its own
+    could mate with, within two pitches, and what it is.
+    """
+    best: dict[int, tuple[float, str]] = {}
+    for male, female in MATES:
+        pairs = near_pairs(placed, placed.of_kind(male), placed.of_kind(female), _FAR)
+        groups = label[placed.part[pairs]]
+        other = groups[:, 0] != groups[:, 1]
+        distance = _apart(placed, pairs[other])
+        for (first, second), apart in zip(groups[other].tolist(), distance, strict=True):
+            if apart <= _FAR:
+                for group, word in ((first, _WORDS[female]), (second, _WORDS[male])):
+                    candidate = (float(apart), word)
+                    best[group] = min(best.get(group, candidate), candidate)
+    return best
 
 
 def _ldu(length: float) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from math import sqrt
 from typing import Final
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from technic.geometry import Array
 from technic.ldraw.placed import Indices, Overlap, PlacedPorts, near_pairs, overlap
 from technic.parts.definition import PortKind
-from technic.tolerances import ANGLE, AXIAL_OVERLAP, RADIAL_OFFSET, SHORT_FEATURE_SHARE
+from technic.tolerances import ANGLE, AXIAL_OVERLAP, RADIAL_OFFSET, SHORT_FEATURE_SHARE, STUD_OFFSET
 from technic.units import LDU
 
 __all__ = ["MATES", "Limits", "Matched", "Mating", "match"]
@@ -31,6 +32,12 @@ MATES: Final[dict[tuple[PortKind, PortKind], str]] = {
 }
 """What enters what, and the key of the stiffness table. Where two parts mate in several ways on one
 line, the first of this list is what joins them."""
+
+_STUD: Final = MATES[PortKind.STUD, PortKind.TUBE]
+
+_BESIDE: Final = (0.0, 10.0 * LDU, 10.0 * sqrt(2.0) * LDU)
+"""Where studs sit from the middle of a tube: in it; beside the rod of a part one stud wide; between
+the four around the tube of a wider part."""
 
 _RANK: Final = {connection: rank for rank, connection in enumerate(MATES.values())}
 
@@ -96,12 +103,15 @@ def match(placed: PlacedPorts, limits: Limits | None = None) -> Matched:
     limits = limits or Limits()
     candidates: list[Mating] = []
     for (male, female), connection in MATES.items():
-        pairs = near_pairs(placed, placed.of_kind(male), placed.of_kind(female), limits.offset)
+        reach = limits.offset if female is not PortKind.TUBE else _BESIDE[-1] + STUD_OFFSET
+        pairs = near_pairs(placed, placed.of_kind(male), placed.of_kind(female), reach)
         if male is PortKind.BALL:
             candidates += _balls(placed, pairs, limits)
+        elif female is PortKind.TUBE:
+            candidates += _tubes(placed, pairs, limits)
         else:
             candidates += _lines(placed, pairs, connection, limits)
-    kept, refused = _occupy(candidates)
+    kept, refused = _occupy(placed, candidates)
     used = frozenset(index for mating in kept for index in (mating.male, mating.female))
     return Matched(tuple(_merge(placed, kept, limits)), used, tuple(refused))
 
@@ -119,9 +129,6 @@ def _lines(
     lie = overlap(placed, pairs)
     good = (lie.offset <= limits.offset) & (lie.angle <= limits.angle)
     good &= enough(placed, pairs, lie)
-    if connection == "stud/tube":
-        facing = np.einsum("ij,ij->i", placed.axis[pairs[:, 0]], placed.axis[pairs[:, 1]])
-        good &= facing < 0.0
     for k in np.flatnonzero(good):
         low, high = float(lie.low[k]), float(lie.high[k])
         male, female = int(pairs[k, 0]), int(pairs[k, 1])
@@ -149,7 +156,24 @@ def _balls(placed: PlacedPorts, pairs: Indices, limits: Limits) -> Iterable[Mati
         )
 
 
-def _occupy(candidates: list[Mating]) -> tuple[list[Mating], list[tuple[int, int]]]:
+def _tubes(placed: PlacedPorts, pairs: Indices, limits: Limits) -> Iterable[Mating]:
+    """Return the studs that sit in a tube or against its outside, on the line of the stud."""
+    lie = overlap(placed, pairs)
+    beside = np.abs(lie.offset[:, None] - np.array(_BESIDE))
+    good = (beside.min(axis=1) <= min(STUD_OFFSET, limits.offset)) & (lie.angle <= limits.angle)
+    good &= enough(placed, pairs, lie)
+    good &= np.einsum("ij,ij->i", placed.axis[pairs[:, 0]], placed.axis[pairs[:, 1]]) < 0.0
+    for k in np.flatnonzero(good):
+        stud, tube = int(pairs[k, 0]), int(pairs[k, 1])
+        low, high = float(lie.low[k]), float(lie.high[k])
+        point, axis = placed.position[stud], placed.axis[stud]
+        offset = float(beside[k].min())
+        yield Mating(_STUD, stud, tube, low, high, offset, point, axis)
+
+
+def _occupy(
+    placed: PlacedPorts, candidates: list[Mating]
+) -> tuple[list[Mating], list[tuple[int, int]]]:
     """Keep the candidates for which there is room: most overlap first, then least offset."""
 
     def preference(mating: Mating) -> tuple[float, float, int, int]:
@@ -164,8 +188,14 @@ def _occupy(candidates: list[Mating]) -> tuple[list[Mating], list[tuple[int, int
     taken: dict[int, list[Mating]] = {}
     kept, refused = [], []
     for mating in sorted(candidates, key=preference):
-        others = taken.setdefault(mating.female, [])
-        if any(_clash(mating, other) for other in others):
+        # A tube has room for studs on all sides, but each stud enters a part once.
+        place = mating.female if mating.connection != _STUD else -1 - mating.male
+        others = taken.setdefault(place, [])
+        if mating.connection == _STUD:
+            if all(placed.part[mating.female] != placed.part[other.female] for other in others):
+                others.append(mating)
+                kept.append(mating)
+        elif any(_clash(mating, other) for other in others):
             refused.append((mating.male, mating.female))
         else:
             others.append(mating)

@@ -148,7 +148,7 @@ def near_pairs(placed: PlacedPorts, first: Indices, second: Indices, reach: floa
     found = tree_a.sparse_distance_matrix(tree_b, reach + _SAMPLE, output_type="ndarray")
     pairs = np.column_stack([owner_a[found["i"]], owner_b[found["j"]]])
     pairs = pairs[placed.part[pairs[:, 0]] != placed.part[pairs[:, 1]]]
-    return np.unique(pairs, axis=0)
+    return np.asarray(np.unique(pairs, axis=0))
 
 
 def _samples(placed: PlacedPorts, chosen: Indices) -> tuple[Array, Indices]:
@@ -193,4 +193,5 @@ def on_line(
     between = placed.position[index] - point
     across = between - (between @ axis)[:, None] * axis
     sine = np.linalg.norm(np.cross(placed.axis[index], axis), axis=1)
-    return index[(np.linalg.norm(across, axis=1) <= offset) & (sine <= np.sin(angle))]
+    close = (np.linalg.norm(across, axis=1) <= offset) & (sine <= np.sin(angle))
+    return np.asarray(index[close])

@@ -4,6 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from technic.assembly.joint_types import JointType
+from technic.assembly.model import FindingKind, Part
+from technic.assembly.stiffness import default_table
+from technic.errors import UsageError
+from technic.geometry import Pose
+from technic.ldraw.connect import connect
+from technic.ldraw.matching import Limits
+from technic.units import LDU
 from tests.ldraw.bricks import (
     X,
     Y,
@@ -20,17 +31,6 @@ from tests.ldraw.bricks import (
     thin_beam,
     turn,
 )
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
-from technic.assembly.joint_types import JointType
-from technic.assembly.model import FindingKind, Part
-from technic.assembly.stiffness import default_table
-from technic.errors import UsageError
-from technic.geometry import Pose
-from technic.ldraw.connect import connect
-from technic.ldraw.matching import Limits
-from technic.units import LDU
 
 TABLE = default_table()
 
