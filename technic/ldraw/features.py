@@ -291,7 +291,7 @@ def _axle_features(line: _Line) -> list[Feature]:
             out.append(Feature(PortKind.AXLE_HOLE, line.at(a), line.at(b)))
     for low, high in _union(axles, AXLE_NOTCH):
         out.append(Feature(PortKind.AXLE, line.at(low), line.at(high)))
-        for a, b in _union(_spans(line, PieceKind.COLLAR), 0.1):
+        for a, b in _rounded_walls(line, PieceKind.COLLAR, 0.9):
             # a collar belongs to the axle it touches; a long one is a hub, not a stop
             if b - a <= MAX_STOP and a <= high + JOIN and b >= low - JOIN:
                 out.append(Feature(PortKind.STOP, line.at(a), line.at(b)))
@@ -303,60 +303,56 @@ MAX_STOP: Final = 8.0
 
 
 def _pins(line: _Line) -> list[Feature]:
-    """Return the pins on a line, long ones divided; a shank made of raw shapes lengthens them."""
-    ribs = [(low + high) / 2.0 for low, high in _spans(line, PieceKind.RIB)]
-    ends: list[tuple[float, float, bool, bool]] = []
-    for piece, low, high, along in line.spans:
-        if piece.kind not in (PieceKind.PIN, PieceKind.PIN_FRICTION):
-            continue
-        friction = piece.kind is PieceKind.PIN_FRICTION or any(low < s < high for s in ribs)
-        for a, b in _divide(low, high):
-            if not any(abs(a - c) < JOIN and abs(b - d) < JOIN for c, d, _, _ in ends):
-                ends.append((a, b, along, friction))
-    if not ends:
+    """Return the pins on a line, long ones divided.
+
+    A pin is drawn as tips with whatever lies between them; so a run of pins, round shank and collars
+    that begins with a tip, and measures whole pitches, is divided from that tip on.
+    """
+    pins = [
+        (low, high, along, piece.kind is PieceKind.PIN_FRICTION)
+        for piece, low, high, along in line.spans
+        if piece.kind in (PieceKind.PIN, PieceKind.PIN_FRICTION)
+    ]
+    if not pins:
         return []
-    ends.sort(key=lambda end: end[0])
-    round_ = _rounded_walls(line, PieceKind.SHANK, 0.5)
-    taken = _union([(a, b) for a, b, _, _ in ends], JOIN)
-    extra: list[tuple[float, float, bool, bool]] = []
-    for low, high, along, friction in ends:
-        # from the base on, away from the tip; up to the next pin on the line, if there is one
-        base, sign = (low, -1.0) if along else (high, 1.0)
-        ahead = [sign * (s - base) for a, b in taken for s in (a, b) if sign * (s - base) > JOIN]
-        reach = sorted(
-            (sign * (a - base), sign * (b - base)) if sign > 0 else (base - b, base - a)
-            for a, b in round_
-        )
-        limit = min(ahead) if ahead else max([b for _, b in reach], default=0.0)
-        steps = round(limit / PITCH_LDU)
-        if steps < 1 or any(
-            -JOIN < sign * (s - base) < JOIN
-            for a, b in taken
-            for s in (a, b)
-            if not (abs(a - low) < JOIN or abs(b - high) < JOIN)
-        ):
-            continue
-        if _covered(0.0, limit, [(max(a, 0.0), b) for a, b in reach if b > 0.0]) < SHANK_SHARE:
-            continue
-        full = limit if ahead else steps * PITCH_LDU
-        if abs(limit - steps * PITCH_LDU) > 3.0:
-            continue
-        for k in range(steps):
-            a = base + sign * full * k / steps
-            b = base + sign * full * (k + 1) / steps
-            extra.append((min(a, b), max(a, b), along, friction))
-    for end in extra:
-        if not any(abs(end[0] - c) < JOIN and abs(end[1] - d) < JOIN for c, d, _, _ in ends):
-            ends.append(end)
+    ribs = [(low + high) / 2.0 for low, high in _spans(line, PieceKind.RIB)]
+    collars = _rounded_walls(line, PieceKind.COLLAR, 0.5)
+    solid = [(low, high) for low, high, _, _ in pins]
+    solid += _rounded_walls(line, PieceKind.SHANK, 0.5)
+    solid += [(low, high) for low, high in collars if high - low <= MAX_COLLAR]
     out = []
-    for low, high, along, friction in ends:
-        start, end_ = (low, high) if along else (high, low)
-        out.append(Feature(PortKind.PIN, line.at(start), line.at(end_), friction))
+    for low, high in _union(solid, JOIN):
+        own = [pin for pin in pins if low - JOIN < pin[0] and pin[1] < high + JOIN]
+        if not own:
+            continue
+        first = any(not along and a < low + JOIN for a, _, along, _ in own)
+        last = any(along and b > high - JOIN for _, b, along, _ in own)
+        steps = round((high - low) / PITCH_LDU)
+        whole = steps >= 1 and abs(high - low - steps * PITCH_LDU) <= NOMINAL_SLACK
+        cuts: list[tuple[float, float, bool]] = []
+        if whole and (first or last):
+            if first and not last:
+                high = low + steps * PITCH_LDU
+            elif last and not first:
+                low = high - steps * PITCH_LDU
+            cuts = [
+                (a, b, last and (not first or a + b > low + high)) for a, b in _divide(low, high)
+            ]
+        else:
+            for a, b, along, _ in own:
+                for c, d in _divide(a, b):
+                    if not any(abs(c - e) < JOIN and abs(d - f) < JOIN for e, f, _ in cuts):
+                        cuts.append((c, d, along))
+        for a, b, along in cuts:
+            rough = any(rubbed and c < b - JOIN and d > a + JOIN for c, d, _, rubbed in own)
+            rough = rough or any(a < s < b for s in ribs)
+            start, end = (a, b) if along else (b, a)
+            out.append(Feature(PortKind.PIN, line.at(start), line.at(end), rough))
     return out
 
 
-SHANK_SHARE: Final = 0.65
-"""Least share of a pin's middle that must be round shank (collars and slits take the rest)."""
+MAX_COLLAR: Final = 4.5
+"""Longest collar within a pin (LDU): the two halves of the one in the middle."""
 
 
 def _points(pieces: Iterable[Piece]) -> list[Feature]:

@@ -208,34 +208,40 @@ def _pieces(occurrences: dict[str, Occurrence], matrix: Array, offset: Array) ->
     """Return the pieces that the primitives stand for."""
     out: list[Piece] = []
     for name, group in occurrences.items():
-        matrices = matrix @ group.matrices
-        offsets = group.offsets @ matrix.T + offset
-        cylinder, sphere = _CYLINDER.match(name), _SPHERE.match(name)
-        for m, t, inverted in zip(matrices, offsets, group.inverted, strict=True):
-            if cylinder:
-                share = int(cylinder.group(1)) / int(cylinder.group(2))
-                out += _cylinder(m, t, share, bool(inverted))
-            elif sphere:
+        group = Occurrence(
+            matrix @ group.matrices, group.offsets @ matrix.T + offset, group.inverted
+        )
+        cylinder = _CYLINDER.match(name)
+        if cylinder:
+            out += _cylinders(group, int(cylinder.group(1)) / int(cylinder.group(2)))
+            continue
+        sphere = _SPHERE.match(name) is not None
+        share = 0.25 if name.startswith("connectslit") else 1.0
+        for m, t, inverted in zip(group.matrices, group.offsets, group.inverted, strict=True):
+            if sphere:
                 out += _sphere(m, t, bool(inverted))
-            else:
-                axis = m[:, 1]
-                share = 0.25 if name.startswith("connectslit") else 1.0
-                for kind, low, high in RULES[name.removesuffix(".dat")]:
-                    out.append(Piece(kind, t + low * axis, t + high * axis, share, bool(inverted)))
+                continue
+            axis = m[:, 1]
+            for kind, low, high in RULES[name.removesuffix(".dat")]:
+                out.append(Piece(kind, t + low * axis, t + high * axis, share, bool(inverted)))
     return out
 
 
-def _cylinder(m: Array, t: Array, share: float, inverted: bool) -> list[Piece]:
-    """Return what a piece of a cylinder says about its line, if anything."""
-    radii = np.linalg.norm(m[:, [0, 2]], axis=0)
-    if abs(radii[0] - radii[1]) > RADIUS_SLACK or abs(float(m[:, 0] @ m[:, 2])) > 1.0:
-        return []
-    radius, end = float(radii.mean()), t + m[:, 1]
-    if abs(radius - PIN_RADIUS) <= RADIUS_SLACK:
-        return [Piece(K.WALL if inverted else K.SHANK, t, end, share, inverted)]
-    if COLLAR_RADII[0] <= radius <= COLLAR_RADII[1] and not inverted and share > 0.9:
-        return [Piece(K.COLLAR, t, end, share)]
-    return []
+def _cylinders(group: Occurrence, share: float) -> list[Piece]:
+    """Return what pieces of round cylinders say about their lines, if anything."""
+    x, axis, z = group.matrices[:, :, 0], group.matrices[:, :, 1], group.matrices[:, :, 2]
+    first, second = np.linalg.norm(x, axis=1), np.linalg.norm(z, axis=1)
+    radii = (first + second) / 2.0
+    round_ = (abs(first - second) <= RADIUS_SLACK) & (abs((x * z).sum(axis=1)) <= 1.0)
+    pin = round_ & (abs(radii - PIN_RADIUS) <= RADIUS_SLACK)
+    collar = round_ & (COLLAR_RADII[0] <= radii) & (radii <= COLLAR_RADII[1])
+    collar &= ~group.inverted
+    out = []
+    for k in np.flatnonzero(pin | collar):
+        kind = K.COLLAR if collar[k] else K.WALL if group.inverted[k] else K.SHANK
+        start = group.offsets[k]
+        out.append(Piece(kind, start, start + axis[k], share, bool(group.inverted[k])))
+    return out
 
 
 def _sphere(m: Array, t: Array, inverted: bool) -> list[Piece]:
