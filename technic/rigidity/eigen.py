@@ -7,7 +7,7 @@ Lagrange multipliers, not as large numbers.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -21,6 +21,11 @@ from technic.geometry import Array
 from technic.tolerances import CONSTRAINT_COMPLIANCE, EIGEN_RESIDUAL
 
 __all__ = ["EigenPairs", "elastic_modes", "single_thread"]
+
+LOCAL = 100
+"""A motion with at most this many unknowns is lifted rather than projected out."""
+
+Inverse = Callable[[Array], Array]
 
 DENSE = 400
 """Number of unknowns up to which a dense solver is as fast and simpler."""
@@ -48,7 +53,7 @@ def elastic_modes(
     stiffness: sparse.csr_array,
     measure: sparse.csr_array,
     constraints: sparse.csr_array,
-    motions: Array,
+    motions: sparse.csc_array,
     count: int,
 ) -> EigenPairs:
     """Return the lowest elastic modes.
@@ -61,10 +66,17 @@ def elastic_modes(
         ``M``, positive definite.
     constraints : (c, n) sparse
         Rows held rigidly; they may depend on each other.
-    motions : (n, k) ndarray
+    motions : (n, k) sparse
         Basis of all unknowns that cost no energy and break no constraint.
     count : int
         Pairs wanted; fewer are returned when there are fewer.
+
+    Returns
+    -------
+    EigenPairs
+        Values are Rayleigh quotients of the vectors. The residual is that of the inverse problem,
+        ``|lambda G M x - x|_M`` with ``G`` the inverse of ``K + J`` on what is elastic: unlike
+        ``K x - lambda M x`` it is not drowned by rounding in the stiffest springs.
 
     Raises
     ------
@@ -72,14 +84,18 @@ def elastic_modes(
         A factorisation failed or a residual is too large.
     """
     n = stiffness.shape[0]
-    motions = _orthonormal(measure, motions)
-    if n <= DENSE:
-        values, vectors = _dense(stiffness, measure, constraints, motions, count)
-    else:
-        with single_thread():
-            values, vectors = _sparse(stiffness, measure, constraints, motions, count)
-    vectors = vectors * _signs(vectors)
-    residuals = _residuals(stiffness, measure, constraints, values, vectors)
+    with single_thread():
+        if n <= DENSE:
+            inverse, shift, vectors = _dense(stiffness, measure, constraints, motions, count)
+        else:
+            inverse, shift, vectors = _sparse(stiffness, measure, constraints, motions, count)
+        vectors = vectors * _signs(vectors)
+        energies = np.einsum("nk,nk->k", vectors, stiffness @ vectors)
+        values = energies / np.einsum("nk,nk->k", vectors, measure @ vectors)
+        residuals = np.zeros(len(values))
+        for k, value in enumerate(values):
+            rest = (value + shift) * inverse(measure @ vectors[:, k]) - vectors[:, k]
+            residuals[k] = np.sqrt(max(rest @ (measure @ rest), 0.0))
     if len(residuals) and residuals.max() > EIGEN_RESIDUAL:
         raise NumericalError(
             f"an eigenpair has a relative residual of {residuals.max():.1e}, "
@@ -105,45 +121,59 @@ def _dense(
     stiffness: sparse.csr_array,
     measure: sparse.csr_array,
     constraints: sparse.csr_array,
-    motions: Array,
+    motions: sparse.csc_array,
     count: int,
-) -> tuple[Array, Array]:
+) -> tuple[Inverse, float, Array]:
     """Solve on the space that obeys the constraints and is M-orthogonal to the motions."""
     m = measure.toarray()
-    rows = np.vstack([constraints.toarray(), (m @ motions).T])
+    rows = np.vstack([constraints.toarray(), (m @ motions.toarray()).T])
     rows = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
     space = linalg.null_space(rows, rcond=1e-10) if len(rows) else np.eye(len(m))
     if space.shape[1] == 0:
-        return np.zeros(0), np.zeros((len(m), 0))
+        return (lambda load: load), 0.0, np.zeros((len(m), 0))
     k = space.T @ (stiffness @ space)
-    values, vectors = linalg.eigh((k + k.T) / 2, space.T @ m @ space)
-    return values[:count], (space @ vectors)[:, :count]
+    try:
+        factor = linalg.cho_factor((k + k.T) / 2)
+        _, vectors = linalg.eigh((k + k.T) / 2, space.T @ m @ space)
+    except linalg.LinAlgError as error:
+        raise NumericalError(f"the stiffness matrix could not be factorised: {error}") from error
+    return (
+        lambda load: space @ linalg.cho_solve(factor, space.T @ load),
+        0.0,
+        (space @ vectors)[:, :count],
+    )
 
 
 def _sparse(
     stiffness: sparse.csr_array,
     measure: sparse.csr_array,
     constraints: sparse.csr_array,
-    motions: Array,
+    motions: sparse.csc_array,
     count: int,
-) -> tuple[Array, Array]:
-    """Shift and invert, with the motions projected out of every step."""
+) -> tuple[Inverse, float, Array]:
+    """Shift and invert, with the motions lifted or projected out of every step.
+
+    A motion w of few parts is lifted: ``k M w w^T M`` is as local as w and moves no elastic mode,
+    because those are M-orthogonal to w. Only motions of many parts are projected out.
+    """
     n, c = stiffness.shape[0], constraints.shape[0]
+    lift, remaining = _lift(stiffness, measure, motions)
     count = min(count, n - motions.shape[1] - c - 1)
     if count <= 0:
-        return np.zeros(0), np.zeros((n, 0))
+        return (lambda load: load), 0.0, np.zeros((n, 0))
     biggest = float(abs(stiffness.diagonal()).max())
-    # A shift of this size keeps the factor well inside rounding and far below any elastic mode worth
-    # a report; the motions that it would lift are projected out anyway.
-    shift = 1e-11 * biggest / max(float(measure.diagonal().max()), 1e-300)
-    matrix = sparse.csc_array(stiffness + shift * measure)
+    # Just above rounding in the stiffest spring: enough for a factor of a singular matrix, while the
+    # motions that it lifts are projected out of every answer.
+    shift = 1e-14 * biggest
+    matrix = sparse.csc_array(stiffness + lift + shift * measure)
     solve = _factor(matrix, constraints, biggest)
-    weighted = measure @ motions
+    projected = _orthonormal(measure, remaining)
+    weighted = measure @ projected
 
     def apply(load: Array) -> Array:
         load = np.ravel(load)
-        answer = solve(load - weighted @ (motions.T @ load))
-        answer -= motions @ (weighted.T @ answer)
+        answer = solve(load - weighted @ (projected.T @ load))
+        answer -= projected @ (weighted.T @ answer)
         return np.asarray(answer)
 
     operator: Any = sparse_linalg.LinearOperator((n, n), matvec=apply, dtype=np.float64)
@@ -154,10 +184,25 @@ def _sparse(
         )
     except sparse_linalg.ArpackError as error:
         raise NumericalError(f"the eigen solver did not converge: {error}") from error
-    order = np.argsort(values)
-    vectors = vectors[:, order]
-    energies = np.einsum("nk,nk->k", vectors, stiffness @ vectors)
-    return energies / np.einsum("nk,nk->k", vectors, measure @ vectors), vectors
+    return apply, shift, vectors[:, np.argsort(values)]
+
+
+def _lift(
+    stiffness: sparse.csr_array, measure: sparse.csr_array, motions: sparse.csc_array
+) -> tuple[sparse.csr_array, Array]:
+    """Return the stiffness that lifts local motions, and the others made M-orthogonal to them."""
+    local = np.diff(motions.indptr) <= LOCAL
+    w = sparse.csc_array(motions[:, local])
+    wide = motions[:, ~local].toarray()
+    if w.shape[1] == 0:
+        return sparse.csr_array(stiffness.shape), wide
+    weighted = sparse.csc_array(measure @ w)
+    gram = sparse.csc_array(w.T @ weighted)
+    if wide.shape[1]:
+        wide = wide - w @ sparse_linalg.splu(gram).solve(np.asarray(weighted.T @ wide))
+    # as stiff as the material, so that lifted motions lie among the highest modes
+    size = float(np.median(stiffness.diagonal())) / gram.diagonal()
+    return sparse.csr_array(weighted @ sparse.diags_array(size) @ weighted.T), wide
 
 
 def _factor(matrix: sparse.csc_array, constraints: sparse.csr_array, biggest: float) -> Any:
@@ -190,26 +235,3 @@ def _signs(vectors: Array) -> Array:
     near = size >= 0.999 * size.max(axis=0)
     first = near.argmax(axis=0)
     return np.sign(vectors[first, np.arange(vectors.shape[1])])
-
-
-def _residuals(
-    stiffness: sparse.csr_array,
-    measure: sparse.csr_array,
-    constraints: sparse.csr_array,
-    values: Array,
-    vectors: Array,
-) -> Array:
-    """Return ``|K x - lambda M x| / | |K| |x| |``, the reactions of the constraints taken out.
-
-    The size in the denominator is that of the terms which cancel in ``K x``, so that rounding in a
-    model with very stiff joints is not mistaken for an error.
-    """
-    if not len(values):
-        return np.zeros(0)
-    rest = stiffness @ vectors - (measure @ vectors) * values
-    if constraints.shape[0]:
-        reactions = sparse_linalg.lsqr
-        ct = sparse.csc_array(constraints.T)
-        rest = np.column_stack([r - ct @ reactions(ct, r, atol=1e-14, btol=1e-14)[0] for r in rest.T])
-    size = abs(stiffness) @ np.abs(vectors) + (measure @ np.abs(vectors)) * np.abs(values)
-    return np.linalg.norm(rest, axis=0) / np.linalg.norm(size, axis=0)

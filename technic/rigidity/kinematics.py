@@ -12,6 +12,7 @@ from functools import cached_property
 import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from technic.assembly.model import Assembly
 from technic.geometry import Array, shift_twist
@@ -72,9 +73,10 @@ class Kinematics:
         own = self.component_of
         return [k for k, owner in enumerate(self.owners) if own[owner[0]] == component]
 
-    def unscale(self, twists: Array) -> Array:
-        """Return scaled twists, (..., 6), in metres and radians."""
-        return twists * np.array([self.length] * 3 + [1.0] * 3)
+    @property
+    def units(self) -> Array:
+        """What turns a scaled twist into metres and radians, (6,)."""
+        return np.array([self.length] * 3 + [1.0] * 3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,8 +86,9 @@ class ComponentMotions:
     Parameters
     ----------
     parts : tuple of int
-    twists : (len(parts), 6, k) ndarray
-        Orthonormal basis of the null space as scaled twists, world axes.
+    twists : (6 * len(parts), k) sparse
+        Basis of the null space as scaled twists, world axes; columns of unit length, most of which
+        move few parts.
     rigid : int
         How many of them are motions of the component as a whole: 6 in space, 3 in the plane, 0 when
         it has a support.
@@ -94,7 +97,7 @@ class ComponentMotions:
     """
 
     parts: tuple[int, ...]
-    twists: Array
+    twists: sparse.csc_array
     rigid: int
     smallest_kept: float
     largest_dropped: float
@@ -102,7 +105,7 @@ class ComponentMotions:
     @property
     def internal(self) -> int:
         """Number of internal motions."""
-        return int(self.twists.shape[2]) - self.rigid
+        return int(self.twists.shape[1]) - self.rigid
 
 
 def kinematics(assembly: Assembly) -> Kinematics:
@@ -167,15 +170,15 @@ def component_motions(kin: Kinematics, component: int) -> ComponentMotions:
         block = [kin.sides[k, s][np.ix_(rows, dofs)] @ carry[p] for s, p in enumerate(owner)]
         blocks.append((tuple(number[bodies[p]] for p in owner), np.hstack(block)))
     space: NullSpace = null_space(blocks, len(heads), width)
-    count = space.basis.shape[1]
-    per_head = space.basis.reshape(len(heads), width, count)
-    twists = np.zeros((len(parts), 6, count))
+    expand = sparse.lil_array((6 * len(parts), width * len(heads)))
     for k, p in enumerate(parts):
-        twists[k, dofs] = carry[p] @ per_head[number[bodies[p]]]
-    flat, _ = np.linalg.qr(twists.reshape(-1, count))
+        h = width * number[bodies[p]]
+        expand[6 * k + dofs, h : h + width] = carry[p]
+    twists = sparse.csc_array(expand.tocsr() @ space.basis)
+    lengths = np.sqrt(np.asarray(twists.multiply(twists).sum(axis=0)).ravel())
     return ComponentMotions(
         parts=parts,
-        twists=flat.reshape(len(parts), 6, count),
+        twists=sparse.csc_array(twists @ sparse.diags_array(1.0 / lengths)),
         rigid=0 if grounded else (3 if width == 3 else 6),
         smallest_kept=space.smallest_kept,
         largest_dropped=space.largest_dropped,

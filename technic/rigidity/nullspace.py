@@ -3,9 +3,10 @@
 Bodies are eliminated one at a time, those with fewest neighbours first: the rows that touch a body are
 turned by an orthogonal matrix (a singular value decomposition of the body's own columns) so that some
 rows determine the body from its neighbours and the rest no longer touch it. Columns that no row
-determines are motions of that body alone. What cannot be eliminated safely stays in a dense core. A
-Rayleigh-Ritz step on the untouched matrix ends it, so that the singular values that decide are those of
-the whole matrix.
+determines are motions of that body alone. What cannot be eliminated safely stays in a dense core.
+
+Rank is thus decided body by body. That matters for long slender models: the smallest singular value of
+the whole matrix falls with the square of a chain's length, although every link of it is rigid.
 """
 
 from __future__ import annotations
@@ -17,13 +18,7 @@ import numpy as np
 from scipy import sparse
 
 from technic.geometry import Array
-from technic.tolerances import (
-    MOBILITY_CUT,
-    PIVOT_CLEAR,
-    PIVOT_ZERO,
-    RITZ_EXTRA,
-    RITZ_LIMIT,
-)
+from technic.tolerances import MOBILITY_CUT, PIVOT_CLEAR, PIVOT_ZERO
 
 __all__ = ["NullSpace", "null_space"]
 
@@ -36,19 +31,20 @@ Block = tuple[tuple[int, ...], Array]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NullSpace:
-    """Orthonormal null space with the singular values on either side of the cut.
+    """Basis of a null space with the singular values on either side of the cut.
 
     Parameters
     ----------
-    basis : (width * bodies, k) ndarray
+    basis : (width * bodies, k) sparse
+        Columns of unit length; each moves few bodies where elimination found it.
     smallest_kept : float
-        Smallest singular value above the cut (a Ritz value, hence never below the true one by more
-        than rounding); infinite when there is none.
+        Smallest singular value that counted as held, of the core or of an eliminated body's own
+        columns; infinite when there is none.
     largest_dropped : float
-        Largest singular value below the cut; 0 when there is none.
+        Largest length of the rows on a column of the basis: how far motions are from breaking no joint.
     """
 
-    basis: Array
+    basis: sparse.csc_array
     smallest_kept: float
     largest_dropped: float
 
@@ -61,6 +57,7 @@ class _Pivot:
     neighbors: tuple[int, ...]
     follow: Array
     free: Array
+    smallest: float
 
 
 def null_space(blocks: list[Block], bodies: int, width: int) -> NullSpace:
@@ -78,8 +75,14 @@ def null_space(blocks: list[Block], bodies: int, width: int) -> NullSpace:
     if bodies <= CORE:
         return _dense(matrix.toarray(), bodies * width)
     pivots, core, rest = _eliminate(blocks, bodies, width)
-    candidates = _candidates(pivots, core, rest, bodies, width)
-    return _ritz(matrix, candidates)
+    vectors, kept = _vectors(pivots, core, rest, bodies, width)
+    lengths = np.sqrt(np.asarray(vectors.multiply(vectors).sum(axis=0)).ravel())
+    basis = sparse.csc_array(vectors @ sparse.diags_array(1.0 / lengths))
+    image = matrix @ basis
+    residues = np.sqrt(np.asarray(image.multiply(image).sum(axis=0)).ravel())
+    return NullSpace(
+        basis, min([kept, *(p.smallest for p in pivots)]), float(residues.max(initial=0.0))
+    )
 
 
 def _stack(blocks: list[Block], bodies: int, width: int) -> sparse.csr_array:
@@ -100,13 +103,13 @@ def _stack(blocks: list[Block], bodies: int, width: int) -> sparse.csr_array:
 
 def _dense(matrix: Array, columns: int) -> NullSpace:
     if len(matrix) == 0:
-        return NullSpace(np.eye(columns), float("inf"), 0.0)
+        return NullSpace(sparse.csc_array(np.eye(columns)), float("inf"), 0.0)
     _, values, vt = np.linalg.svd(matrix, full_matrices=True)
     values = np.concatenate([values, np.zeros(columns - len(values))])
     dropped = values < MOBILITY_CUT
     kept = values[~dropped]
     return NullSpace(
-        vt[dropped].T,
+        sparse.csc_array(vt[dropped].T),
         float(kept.min()) if len(kept) else float("inf"),
         float(values[dropped].max()) if dropped.any() else 0.0,
     )
@@ -144,7 +147,8 @@ def _eliminate(
             continue
         rank = int(np.sum(values >= PIVOT_CLEAR))
         follow = -(vt[:rank].T / values[:rank]) @ (u[:, :rank].T @ rest)
-        pivots.append(_Pivot(body, tuple(others), follow, vt[rank:].T))
+        smallest = float(values[rank - 1]) if rank else float("inf")
+        pivots.append(_Pivot(body, tuple(others), follow, vt[rank:].T, smallest))
         alive.discard(body)
         reduced = u[:, rank:].T @ rest
         if len(reduced) > reduced.shape[1]:
@@ -178,16 +182,17 @@ def _gather(blocks: list[Block], order: list[int], width: int) -> Array:
     return out
 
 
-def _candidates(
+def _vectors(
     pivots: list[_Pivot], core: list[int], rest: list[Block], bodies: int, width: int
-) -> sparse.csc_array:
-    """Return vectors that span the null space and its nearest neighbourhood, as sparse columns."""
+) -> tuple[sparse.csc_array, float]:
+    """Return a basis of the null space as sparse columns, and the smallest value kept in the core."""
     dense = _gather(rest, core, width) if core else np.zeros((0, 0))
     if len(dense) > dense.shape[1]:
         dense = np.linalg.qr(dense, mode="r")
     _, values, vt = np.linalg.svd(dense, full_matrices=True)
     values = np.concatenate([values, np.zeros(dense.shape[1] - len(values))])
-    count = min(int(np.sum(values < RITZ_LIMIT)) + RITZ_EXTRA, len(values))
+    count = int(np.sum(values < MOBILITY_CUT))
+    kept = float(values[: len(values) - count].min(initial=np.inf))
     start = vt[len(values) - count :].T
     entries: dict[int, tuple[Array, Array]] = {
         b: (np.arange(count), start[width * k : width * k + width]) for k, b in enumerate(core)
@@ -210,26 +215,5 @@ def _candidates(
         rows.append(np.repeat(np.arange(width * b, width * b + width), len(where)))
         index.append(np.tile(where, width))
     coordinates = (np.concatenate(rows), np.concatenate(index))
-    return sparse.csc_array((np.concatenate(data), coordinates), shape=(width * bodies, column))
-
-
-def _ritz(matrix: sparse.csr_array, candidates: sparse.csc_array) -> NullSpace:
-    """Return the null space inside the span of `candidates`, judged by the whole matrix."""
-    gram = (candidates.T @ candidates).toarray()
-    image = matrix @ candidates
-    energy = (image.T @ image).toarray()
-    scale = 1.0 / np.sqrt(np.diag(gram))
-    lengths, q = np.linalg.eigh(gram * np.outer(scale, scale))
-    good = lengths > 1e-12 * lengths[-1]
-    to_orthonormal = (scale[:, None] * q[:, good]) / np.sqrt(lengths[good])
-    squares, v = np.linalg.eigh(to_orthonormal.T @ energy @ to_orthonormal)
-    values = np.sqrt(np.clip(squares, 0.0, None))
-    dropped = values < MOBILITY_CUT
-    basis = np.asarray(candidates @ (to_orthonormal @ v[:, dropped]))
-    # the squares above lose half the digits; the image of the basis itself does not
-    residue = np.linalg.norm(np.asarray(matrix @ basis), 2) if dropped.any() else 0.0
-    return NullSpace(
-        basis,
-        float(values[~dropped].min()) if (~dropped).any() else float("inf"),
-        float(residue),
-    )
+    vectors = sparse.csc_array((np.concatenate(data), coordinates), shape=(width * bodies, column))
+    return vectors, kept

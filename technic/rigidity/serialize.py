@@ -1,6 +1,7 @@
 """The report as the JSON object of the contract ``technic-report/1``.
 
-Numbers carry their unit in the key, or are SI. Vectors are in the axes of the model file (LDraw: x right, -y up).
+Numbers carry their unit in the key, or are SI. Vectors are in the axes of the model file (LDraw: x to the
+right, -y up).
 
 The worst-case load is given for a size of 1 N. The size of a load is measured in the norm that belongs
 to the rigidity: the load ``f`` has the size ``sqrt(f^T M^-1 f)``, so that a load of 1 N in its worst

@@ -1,0 +1,297 @@
+"""The internal motions of a component, sorted into four kinds and made readable.
+
+Spinning, sliding and most idle motions belong to one cluster alone. What remains, seen on the clusters
+that hold more than fasteners and with the main body standing still, is structural; its basis is chosen so
+that each motion moves as few clusters as possible.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from technic.geometry import Array, shift_twist
+from technic.rigidity.clusters import Cluster, LocalMotion, find_clusters
+from technic.rigidity.kinematics import ComponentMotions, Kinematics, rigid_twists
+from technic.rigidity.result import Motion, MotionKind
+from technic.rigidity.screw import describe_twists
+from technic.rigidity.symmetry import is_rotor
+from technic.tolerances import MOTION_KIND_CUT, SAME_LINE
+
+__all__ = ["SortedMotions", "sort_motions"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SortedMotions:
+    """Counts per kind and the motions themselves (idle ones are listed where they are one part's own).
+
+    Parameters
+    ----------
+    structural, spinning, sliding, idle : int
+    motions : tuple of Motion
+    clusters : tuple of Cluster
+        Main body first.
+    """
+
+    structural: int
+    spinning: int
+    sliding: int
+    idle: int
+    motions: tuple[Motion, ...]
+    clusters: tuple[Cluster, ...]
+
+
+def sort_motions(kin: Kinematics, motions: ComponentMotions, component: int) -> SortedMotions:
+    """Sort the internal motions of a component.
+
+    Returns
+    -------
+    SortedMotions
+        ``structural + spinning + sliding + idle`` is `motions.internal`.
+    """
+    links = kin.links_of(component)
+    clusters = find_clusters(kin, motions, links)
+    if motions.internal <= 0:
+        return SortedMotions(0, 0, 0, 0, (), tuple(clusters))
+    grounded = motions.rigid == 0
+    local: list[tuple[MotionKind, Cluster, LocalMotion]] = []
+    for n, cluster in enumerate(clusters):
+        if n == 0 and not grounded:
+            continue
+        for motion in cluster.local:
+            kind = _local_kind(kin, cluster, motion)
+            if kind is not MotionKind.STRUCTURAL:
+                local.append((kind, cluster, motion))
+    structural = _structural(kin, motions, clusters, local, grounded)
+    spinning = sum(kind is MotionKind.SPINNING for kind, _, _ in local)
+    sliding = sum(kind is MotionKind.SLIDING for kind, _, _ in local)
+    idle = motions.internal - len(structural) - spinning - sliding
+    out = [_motion(kin, component, MotionKind.STRUCTURAL, clusters, t) for t in structural]
+    for kind, cluster, motion in local:
+        out.append(_motion(kin, component, kind, [cluster], motion.twist[None]))
+    order = list(MotionKind)
+    out.sort(key=lambda m: (order.index(m.kind), -len(m.parts)))
+    return SortedMotions(
+        len(structural), spinning, sliding, idle, tuple(out), tuple(clusters)
+    )
+
+
+def _local_kind(kin: Kinematics, cluster: Cluster, motion: LocalMotion) -> MotionKind:
+    one_line = _one_line(kin, cluster)
+    if not motion.rotation:
+        return MotionKind.SLIDING if one_line else MotionKind.STRUCTURAL
+    if cluster.fasteners_only:
+        return MotionKind.IDLE
+    parts = [kin.assembly.parts[p] for p in cluster.parts]
+    axis = motion.twist[3:] / np.linalg.norm(motion.twist[3:])
+    point = cluster.reference + kin.length * np.cross(axis, motion.twist[:3]) / np.linalg.norm(
+        motion.twist[3:]
+    )
+    balls = _ball_centers(kin, cluster)
+    if balls is not None and len(balls) >= 2:
+        return MotionKind.IDLE  # a rod between two balls turns about itself
+    if one_line and is_rotor(parts, point, axis):
+        return MotionKind.SPINNING
+    return MotionKind.STRUCTURAL
+
+
+def _ball_centers(kin: Kinematics, cluster: Cluster) -> Array | None:
+    """Return the distinct centres when all joints of the cluster are balls, else None."""
+    joints = kin.assembly.joints
+    if any(k >= len(joints) or joints[k].held[3:].any() for k in cluster.outer):
+        return None
+    points = np.array([joints[k].point for k in cluster.outer])
+    return np.unique(points.round(6), axis=0)
+
+
+def _one_line(kin: Kinematics, cluster: Cluster) -> bool:
+    """Tell whether all joints of the cluster share one line."""
+    joints = kin.assembly.joints
+    if any(k >= len(joints) for k in cluster.outer):
+        return False
+    first = joints[cluster.outer[0]]
+    line = first.axes[0]
+    for k in cluster.outer[1:]:
+        other = joints[k]
+        arm = other.point - first.point
+        if np.linalg.norm(arm - (arm @ line) * line) > SAME_LINE:
+            return False
+        if abs(other.axes[0] @ line) < 1.0 - MOTION_KIND_CUT:
+            return False
+    return True
+
+
+def _structural(
+    kin: Kinematics,
+    motions: ComponentMotions,
+    clusters: list[Cluster],
+    local: list[tuple[MotionKind, Cluster, LocalMotion]],
+    grounded: bool,
+) -> list[Array]:
+    """Return a sparse basis of the structural motions, each (clusters, 6): twists of the clusters.
+
+    Fastener-only clusters are given the motion they take part in, without their own idle share.
+    """
+    field = _cluster_field(kin, motions, clusters)
+    bodies = [n for n, c in enumerate(clusters) if not c.fasteners_only]
+    if not bodies:
+        return []
+    if not grounded:
+        field = field - _as_one_body(kin, clusters, field[0])
+    own = {id(c): n for n, c in enumerate(clusters)}
+    flat = field[bodies].reshape(6 * len(bodies), -1)
+    flat = flat[:, np.abs(flat).max(axis=0) > 0.0]
+    removed = [
+        _embed(bodies.index(own[id(c)]), len(bodies), m.twist)
+        for _, c, m in local
+        if not c.fasteners_only
+    ]
+    if removed:
+        q, _ = np.linalg.qr(np.array(removed).T)
+        flat = flat - q @ (q.T @ flat)
+    if flat.shape[1] == 0:
+        return []
+    u, values, _ = np.linalg.svd(flat, full_matrices=False)
+    space = u[:, values > MOTION_KIND_CUT * max(1.0, float(values[0]))]
+    basis = _sparse_basis(space, len(bodies))
+    out = []
+    for vector in basis:
+        twists = np.zeros((len(clusters), 6))
+        twists[bodies] = vector
+        out.append(twists)
+    return out
+
+
+def _embed(body: int, bodies: int, twist: Array) -> Array:
+    out = np.zeros((bodies, 6))
+    out[body] = twist
+    return out.ravel()
+
+
+def _cluster_field(
+    kin: Kinematics, motions: ComponentMotions, clusters: list[Cluster]
+) -> Array:
+    """Return the twist of every cluster about its reference point, (clusters, 6, k)."""
+    place = {p: k for k, p in enumerate(motions.parts)}
+    rows = motions.twists.tocsr()
+    out = np.zeros((len(clusters), 6, motions.twists.shape[1]))
+    for n, cluster in enumerate(clusters):
+        p = cluster.parts[0]
+        arm = (cluster.reference - kin.origins[p]) / kin.length
+        out[n] = shift_twist(arm) @ rows[6 * place[p] : 6 * place[p] + 6].toarray()
+    return out
+
+
+def _as_one_body(kin: Kinematics, clusters: list[Cluster], main: Array) -> Array:
+    """Return the field when every cluster moves with the main body."""
+    arms = np.array([(c.reference - clusters[0].reference) / kin.length for c in clusters])
+    return shift_twist(arms) @ main
+
+
+def _sparse_basis(space: Array, bodies: int) -> list[Array]:
+    """Return a basis whose vectors move as few bodies as a greedy search finds.
+
+    For each body in turn, the largest last, other bodies are held still one after another as long as
+    some motion of this body is left; the shortest independent results are kept.
+    """
+    count = space.shape[1]
+    blocks = space.reshape(bodies, 6, count)
+    size = np.linalg.norm(blocks, axis=(1, 2))
+    moving = [b for b in range(bodies) if size[b] > MOTION_KIND_CUT]
+    found: list[Array] = []
+    for body in moving:
+        still = np.eye(count)
+        for other in moving:
+            if other == body or still.shape[1] == 1:
+                continue
+            _, values, vt = np.linalg.svd(blocks[other] @ still, full_matrices=True)
+            values = np.concatenate([values, np.zeros(still.shape[1] - len(values))])[
+                : still.shape[1]
+            ]
+            trial = still @ vt[values < MOTION_KIND_CUT].T
+            if trial.shape[1] and np.linalg.norm(blocks[body] @ trial, 2) > MOTION_KIND_CUT:
+                still = trial
+        _, _, vt = np.linalg.svd(blocks[body] @ still)
+        vector = (space @ (still @ vt[0])).reshape(bodies, 6)
+        found.append(vector / np.abs(vector).max())
+    found.sort(key=lambda v: int(np.sum(np.linalg.norm(v, axis=1) > MOTION_KIND_CUT)))
+    chosen: list[Array] = []
+    taken = np.zeros((space.shape[0], 0))
+    for vector in found:
+        rest = vector.ravel() / np.linalg.norm(vector)
+        for _ in range(2):
+            rest = rest - taken @ (taken.T @ rest)
+        if np.linalg.norm(rest) > MOTION_KIND_CUT:
+            chosen.append(vector)
+            taken = np.column_stack([taken, rest / np.linalg.norm(rest)])
+        if len(chosen) == count:
+            break
+    for column in (space - taken @ (taken.T @ space)).T:  # what the search did not reach
+        if len(chosen) == count:
+            break
+        rest = column - taken @ (taken.T @ column)
+        if np.linalg.norm(rest) > MOTION_KIND_CUT:
+            chosen.append(rest.reshape(bodies, 6) / np.abs(rest).max())
+            taken = np.column_stack([taken, rest / np.linalg.norm(rest)])
+    return chosen
+
+
+def _motion(
+    kin: Kinematics, component: int, kind: MotionKind, clusters: list[Cluster], twists: Array
+) -> Motion:
+    """Turn twists of clusters into a record: parts, type, axis, freeing joints."""
+    parts: list[int] = []
+    part_twists: list[Array] = []
+    for cluster, twist in zip(clusters, twists, strict=True):
+        if np.abs(twist).max() < MOTION_KIND_CUT * np.abs(twists).max():
+            continue
+        for p in cluster.parts:
+            arm = (kin.origins[p] - cluster.reference) / kin.length
+            parts.append(p)
+            part_twists.append((shift_twist(arm) @ twist) * kin.units)
+    moved = np.array(part_twists)
+    moved /= max(
+        float(np.linalg.norm(moved[:, :3], axis=1).max()),
+        kin.length * float(np.linalg.norm(moved[:, 3:], axis=1).max()),
+    )
+    shape = describe_twists(kin.origins[parts], moved, kin.length)
+    return Motion(
+        kind=kind,
+        type=shape.type,
+        parts=tuple(parts),
+        freed_by=_freed_by(kin, component, parts, moved),
+        twists=moved,
+        axis_point=shape.point,
+        axis_direction=shape.direction,
+        pitch=shape.pitch,
+        component=component,
+    )
+
+
+def _freed_by(
+    kin: Kinematics, component: int, parts: list[int], twists: Array
+) -> tuple[int, ...]:
+    """Return the joints in which the motion takes place.
+
+    A joint to a fastener that is not itself listed counts when the listed part moves there.
+    """
+    scaled = {p: t / kin.units for p, t in zip(parts, twists, strict=True)}
+    size = max(float(np.abs(t).max()) for t in scaled.values())
+    out = []
+    for k in kin.links_of(component):
+        owner = kin.owners[k]
+        if len(owner) != 2 or not any(p in scaled for p in owner):
+            continue
+        slip = sum(
+            (kin.sides[k, s] @ scaled[p] for s, p in enumerate(owner) if p in scaled), np.zeros(6)
+        )
+        free = ~kin.held[k]
+        if np.abs(slip[free]).max(initial=0.0) > MOTION_KIND_CUT * size:
+            out.append(k)
+    return tuple(out)
+
+
+def whole_body(kin: Kinematics, parts: tuple[int, ...]) -> Array:
+    """Return the rigid motions of a component in metres and radians, (len(parts), 6, k)."""
+    return rigid_twists(kin, parts) * kin.units[:, None]
