@@ -204,7 +204,8 @@ def placements(
     """
     surveyor = Surveyor(document, knows)
     surveyor.check(max_parts)
-    leaves = _expand(document, surveyor)
+    with np.errstate(over="ignore", invalid="ignore"):  # looked for, and refused, in _finish
+        leaves = _expand(document, surveyor)
     notices = [*document.notices, *surveyor.notices()]
     if not leaves:
         raise InputError(

@@ -298,8 +298,8 @@ def parse_line(text: str, number: int, path: Path) -> Line:
         match = _REFERENCE.fullmatch(stripped)
         if match is not None:
             color, numbers, name = match.groups()
-            values = [float(v) for v in numbers.split()]
-            if all(-MAX_NUMBER <= v <= MAX_NUMBER for v in values):
+            values = [*map(float, numbers.split())]
+            if min(values) >= -MAX_NUMBER and max(values) <= MAX_NUMBER:
                 return Reference(
                     number,
                     text,
