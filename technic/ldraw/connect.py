@@ -8,6 +8,7 @@ stiffness table that it got its numbers from.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Final, Literal
 
 import numpy as np
@@ -16,7 +17,7 @@ from technic.assembly.joint_types import JointType
 from technic.assembly.model import Finding, Joint, Part
 from technic.assembly.stiffness import ConnectionStiffness, StiffnessTable
 from technic.errors import UsageError
-from technic.geometry import Array, axes_from
+from technic.geometry import Array, axes_from, readonly
 from technic.ldraw.findings import find
 from technic.ldraw.matching import Limits, Mating, match
 from technic.ldraw.placed import PlacedPorts, collect
@@ -74,6 +75,12 @@ def connect(
     return joints, find(placed, matched, joints, limits)
 
 
+@lru_cache(maxsize=4096)
+def _axes(x: float, y: float, z: float) -> Array:
+    """Return the joint axes of a line; most lines of a model are parallel."""
+    return readonly(axes_from((x, y, z)))
+
+
 def _pair(placed: PlacedPorts, mating: Mating) -> tuple[int, int]:
     a, b = int(placed.part[mating.male]), int(placed.part[mating.female])
     return (a, b) if a < b else (b, a)
@@ -108,7 +115,7 @@ def _joint(
         type_ = JointType.FIXED if axle_slide == "held" else JointType.SLIDER
     elif mating.connection == "axle/pin_hole":
         type_ = JointType.CYLINDRICAL if missing else JointType.HINGE
-    axes = axes_from(mating.axis)
+    axes = _axes(*mating.axis)
     return _build(placed, mating, entry, type_, entry.vector(), joint_id, axes, missing)
 
 
@@ -125,18 +132,16 @@ def _studs(
     first = matings[0]
     if len(matings) == 1:
         type_ = JointType.HINGE
-        return _build(placed, first, entry, type_, single, joint_id, axes_from(first.axis), "")
+        return _build(placed, first, entry, type_, single, joint_id, _axes(*first.axis), "")
     points = np.array([mating.point for mating in matings])
     middle = points.mean(axis=0)
-    axis = first.axis / np.linalg.norm(first.axis)
-    arms = points - middle
-    arms = arms - np.outer(arms @ axis, axis)
-    # Principal directions of the pattern make the rotational stiffness diagonal.
-    _, _, directions = np.linalg.svd(arms, full_matrices=True)
-    along = directions[0] - (directions[0] @ axis) * axis
-    along /= np.linalg.norm(along)
-    axes = np.array([axis, along, np.cross(axis, along)])
-    y, z = arms @ axes[1], arms @ axes[2]
+    axes = np.array(_axes(*first.axis))
+    y, z = axes[1:] @ (points - middle).T
+    # Turned to the principal directions of the pattern, the rotational stiffness is diagonal.
+    angle = 0.5 * np.arctan2(2.0 * float(y @ z), float(y @ y - z @ z))
+    c, s = np.cos(angle), np.sin(angle)
+    axes[1:] = [c * axes[1] + s * axes[2], c * axes[2] - s * axes[1]]
+    y, z = c * y + s * z, c * z - s * y
     stiffness = len(matings) * np.array(single)
     stiffness[3] += single[1] * float(y @ y + z @ z)
     stiffness[4] += single[0] * float(z @ z)

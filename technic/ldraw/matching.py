@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from math import sqrt
+from math import sin, sqrt
 from typing import Final
 
 import numpy as np
@@ -38,6 +38,9 @@ _STUD: Final = MATES[PortKind.STUD, PortKind.TUBE]
 _BESIDE: Final = (0.0, 10.0 * LDU, 10.0 * sqrt(2.0) * LDU)
 """Where studs sit from the middle of a tube: in it; beside the rod of a part one stud wide; between
 the four around the tube of a wider part."""
+
+_POINTS: Final = {_STUD, MATES[PortKind.BALL, PortKind.SOCKET]}
+"""Connections at a point of their own: never merged along a line."""
 
 _RANK: Final = {connection: rank for rank, connection in enumerate(MATES.values())}
 
@@ -233,17 +236,20 @@ def _merge(placed: PlacedPorts, matings: list[Mating], limits: Limits) -> list[M
 
 
 def _same_line(first: Mating, second: Mating, limits: Limits) -> bool:
-    ball = MATES[PortKind.BALL, PortKind.SOCKET]
-    if ball in (first.connection, second.connection):
+    if {first.connection, second.connection} & _POINTS:
         return False
-    if np.linalg.norm(np.cross(first.axis, second.axis)) > np.sin(limits.angle):
+    cosine = float(first.axis @ second.axis)
+    if 1.0 - cosine * cosine > sin(limits.angle) ** 2:
         return False
-    across = np.cross(second.point - first.point, first.axis)
-    return float(np.linalg.norm(across)) <= limits.offset
+    between = second.point - first.point
+    along = float(between @ first.axis)
+    return float(between @ between) - along * along <= limits.offset**2
 
 
 def _strongest(line: list[Mating]) -> Mating:
     """Merge the matings of one line: the strongest kind, over the whole stretch they share."""
+    if len(line) == 1:
+        return line[0]
     best = min(
         line,
         key=lambda m: (_RANK[m.connection], -round((m.high - m.low) / LDU), m.male, m.female),

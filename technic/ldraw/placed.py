@@ -146,9 +146,10 @@ def near_pairs(placed: PlacedPorts, first: Indices, second: Indices, reach: floa
     # Every point of a port is within _SAMPLE / 2 of a sample, so two ports within reach have samples
     # within reach + _SAMPLE.
     found = tree_a.sparse_distance_matrix(tree_b, reach + _SAMPLE, output_type="ndarray")
-    pairs = np.column_stack([owner_a[found["i"]], owner_b[found["j"]]])
-    pairs = pairs[placed.part[pairs[:, 0]] != placed.part[pairs[:, 1]]]
-    return np.asarray(np.unique(pairs, axis=0))
+    i, j = owner_a[found["i"]], owner_b[found["j"]]
+    total = len(placed.part)
+    codes = np.unique((i * total + j)[placed.part[i] != placed.part[j]])
+    return np.column_stack([codes // total, codes % total])
 
 
 def _samples(placed: PlacedPorts, chosen: Indices) -> tuple[Array, Indices]:
