@@ -8,6 +8,8 @@ material. Shape functions with shear: J. S. Przemieniecki, *Theory of Matrix Str
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from technic.errors import InputError
@@ -50,13 +52,17 @@ def frame_element(body: FrameBody, properties: MassProperties, attachments: Arra
     n = len(node_points)
     stiffness = np.zeros((6 * n, 6 * n))
     mass = np.zeros((6 * n, 6 * n))
-    for (a, b), m in zip(pairs, member_of, strict=True):
-        k, mm = member_matrices(
-            node_points[a], node_points[b], body.normals[m], body.sections[m], body.material
+    for (a, b), member in zip(pairs, member_of, strict=True):
+        block, inertia = member_matrices(
+            node_points[a],
+            node_points[b],
+            body.normals[member],
+            body.sections[member],
+            body.material,
         )
         dofs = np.r_[6 * a : 6 * a + 6, 6 * b : 6 * b + 6]
-        stiffness[np.ix_(dofs, dofs)] += k
-        mass[np.ix_(dofs, dofs)] += mm
+        stiffness[np.ix_(dofs, dofs)] += block
+        mass[np.ix_(dofs, dofs)] += inertia
     rigid = shift_twist(node_points - properties.centroid).reshape(6 * n, 6)
     unscaled = float(rigid[:, 0] @ mass @ rigid[:, 0])
     mass *= properties.mass / unscaled
@@ -64,8 +70,8 @@ def frame_element(body: FrameBody, properties: MassProperties, attachments: Arra
     for row, node in enumerate(node_of):
         frames[row, :, 6 * node : 6 * node + 6] = np.eye(6)
     nodes = np.zeros((n, 3, 6 * n))
-    for k in range(n):
-        nodes[k, :, 6 * k : 6 * k + 3] = np.eye(3)
+    for node in range(n):
+        nodes[node, :, 6 * node : 6 * node + 3] = np.eye(3)
     return Element(
         stiffness=stiffness,
         mass=mass,
@@ -105,14 +111,14 @@ def _subdivide(
     member_of: list[int] = []
     for m, station in enumerate(stations):
         order = sorted(station)
-        for s, e in zip(order[:-1], order[1:], strict=True):
+        for s, e in pairwise(order):
             pieces = max(1, int(np.ceil((e - s) * lengths[m] / body.max_stretch - 1e-9)))
             inner = []
             for k in range(1, pieces):
                 inner.append(len(nodes))
                 nodes.append(starts[m] + (s + (e - s) * k / pieces) * spans[m])
             chain = [station[s], *inner, station[e]]
-            pairs += list(zip(chain[:-1], chain[1:], strict=True))
+            pairs += pairwise(chain)
             member_of += [m] * pieces
     return np.array(nodes), pairs, member_of, node_of
 
@@ -144,8 +150,7 @@ def member_matrices(
     if size < 1e-9:
         raise InputError("the normal of a frame member is parallel to the member")
     z = z / size
-    turn = turn_twist(np.array([x, np.cross(z, x), z]))
-    turn = np.kron(np.eye(2), turn)
+    turn = np.kron(np.eye(2), turn_twist(np.array([x, np.cross(z, x), z])))
     k = _local_stiffness(length, section, material)
     m = _local_mass(length, section, material)
     return turn.T @ k @ turn, turn.T @ m @ turn

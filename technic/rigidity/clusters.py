@@ -88,9 +88,7 @@ def find_clusters(kin: Kinematics, motions: ComponentMotions, links: list[int]) 
     first = [tuple(sorted(c)) for c in nx.connected_components(graph)]
     home = {p: n for n, parts in enumerate(first) for p in parts}
     fasteners = {
-        n
-        for n, parts in enumerate(first)
-        if all(kin.assembly.parts[p].fastener for p in parts)
+        n for n, parts in enumerate(first) if all(kin.assembly.parts[p].fastener for p in parts)
     }
     outer: list[list[int]] = [[] for _ in first]
     for k in links:

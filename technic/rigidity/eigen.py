@@ -234,4 +234,4 @@ def _signs(vectors: Array) -> Array:
     size = np.abs(vectors)
     near = size >= 0.999 * size.max(axis=0)
     first = near.argmax(axis=0)
-    return np.sign(vectors[first, np.arange(vectors.shape[1])])
+    return np.asarray(np.sign(vectors[first, np.arange(vectors.shape[1])]))

@@ -17,10 +17,10 @@ from scipy import sparse
 from technic.assembly.model import Assembly
 from technic.geometry import Array, shift_twist
 from technic.rigidity.nullspace import Block, NullSpace, null_space
-from technic.system.rows import held_rows, transfer
+from technic.system.rows import transfer
 from technic.tolerances import MOBILITY_LENGTH
 
-__all__ = ["ComponentMotions", "Kinematics", "component_motions", "kinematics", "rigid_twists"]
+__all__ = ["ComponentMotions", "Kinematics", "component_motions", "kinematics"]
 
 PLANE = np.array([0, 1, 5])
 """Unknowns of a twist that stay in the plane z = 0."""
@@ -117,7 +117,9 @@ def kinematics(assembly: Assembly) -> Kinematics:
     length = _length(assembly, reference)
     shrink = np.array([1 / length] * 3 + [1.0] * 3)
     sides = np.stack([side_a, side_b], axis=1) * shrink[:, None] / shrink
-    held = np.array([j.held for j in assembly.joints] + [s.held for s in assembly.supports], dtype=bool)
+    held = np.array(
+        [j.held for j in assembly.joints] + [s.held for s in assembly.supports], dtype=bool
+    )
     return Kinematics(
         assembly=assembly,
         length=length,
@@ -208,12 +210,3 @@ def _merge_fixed(kin: Kinematics, parts: tuple[int, ...], links: list[int]) -> d
 def _carry(kin: Kinematics, head: int, part: int) -> Array:
     arm = (kin.origins[part] - kin.origins[head]) / kin.length
     return shift_twist(arm)
-
-
-def rigid_twists(kin: Kinematics, parts: tuple[int, ...]) -> Array:
-    """Return the motions of a component as a whole, (len(parts), 6, 6 or 3), scaled twists.
-
-    The reference point is the mean of the parts' centroids.
-    """
-    arms = (kin.origins[list(parts)] - kin.origins[list(parts)].mean(axis=0)) / kin.length
-    return shift_twist(arms)[:, :, kin.dofs]

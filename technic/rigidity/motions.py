@@ -13,7 +13,7 @@ import numpy as np
 
 from technic.geometry import Array, shift_twist
 from technic.rigidity.clusters import Cluster, LocalMotion, find_clusters
-from technic.rigidity.kinematics import ComponentMotions, Kinematics, rigid_twists
+from technic.rigidity.kinematics import ComponentMotions, Kinematics
 from technic.rigidity.result import Motion, MotionKind
 from technic.rigidity.screw import describe_twists
 from technic.rigidity.symmetry import is_rotor
@@ -72,9 +72,7 @@ def sort_motions(kin: Kinematics, motions: ComponentMotions, component: int) -> 
         out.append(_motion(kin, component, kind, [cluster], motion.twist[None]))
     order = list(MotionKind)
     out.sort(key=lambda m: (order.index(m.kind), -len(m.parts)))
-    return SortedMotions(
-        len(structural), spinning, sliding, idle, tuple(out), tuple(clusters)
-    )
+    return SortedMotions(len(structural), spinning, sliding, idle, tuple(out), tuple(clusters))
 
 
 def _local_kind(kin: Kinematics, cluster: Cluster, motion: LocalMotion) -> MotionKind:
@@ -169,9 +167,7 @@ def _embed(body: int, bodies: int, twist: Array) -> Array:
     return out.ravel()
 
 
-def _cluster_field(
-    kin: Kinematics, motions: ComponentMotions, clusters: list[Cluster]
-) -> Array:
+def _cluster_field(kin: Kinematics, motions: ComponentMotions, clusters: list[Cluster]) -> Array:
     """Return the twist of every cluster about its reference point, (clusters, 6, k)."""
     place = {p: k for k, p in enumerate(motions.parts)}
     rows = motions.twists.tocsr()
@@ -269,9 +265,7 @@ def _motion(
     )
 
 
-def _freed_by(
-    kin: Kinematics, component: int, parts: list[int], twists: Array
-) -> tuple[int, ...]:
+def _freed_by(kin: Kinematics, component: int, parts: list[int], twists: Array) -> tuple[int, ...]:
     """Return the joints in which the motion takes place.
 
     A joint to a fastener that is not itself listed counts when the listed part moves there.
@@ -290,8 +284,3 @@ def _freed_by(
         if np.abs(slip[free]).max(initial=0.0) > MOTION_KIND_CUT * size:
             out.append(k)
     return tuple(out)
-
-
-def whole_body(kin: Kinematics, parts: tuple[int, ...]) -> Array:
-    """Return the rigid motions of a component in metres and radians, (len(parts), 6, k)."""
-    return rigid_twists(kin, parts) * kin.units[:, None]

@@ -15,6 +15,7 @@ import heapq
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from technic.geometry import Array
@@ -152,7 +153,7 @@ def _eliminate(
         alive.discard(body)
         reduced = u[:, rank:].T @ rest
         if len(reduced) > reduced.shape[1]:
-            reduced = np.linalg.qr(reduced, mode="r")
+            reduced = np.asarray(np.linalg.qr(reduced, mode="r"))
         for k in keys:
             for b in store.pop(k)[0]:
                 touching[b].discard(k)
@@ -188,13 +189,13 @@ def _vectors(
     """Return a basis of the null space as sparse columns, and the smallest value kept in the core."""
     dense = _gather(rest, core, width) if core else np.zeros((0, 0))
     if len(dense) > dense.shape[1]:
-        dense = np.linalg.qr(dense, mode="r")
+        dense = np.asarray(np.linalg.qr(dense, mode="r"))
     _, values, vt = np.linalg.svd(dense, full_matrices=True)
     values = np.concatenate([values, np.zeros(dense.shape[1] - len(values))])
     count = int(np.sum(values < MOBILITY_CUT))
     kept = float(values[: len(values) - count].min(initial=np.inf))
     start = vt[len(values) - count :].T
-    entries: dict[int, tuple[Array, Array]] = {
+    entries: dict[int, tuple[NDArray[np.int64], Array]] = {
         b: (np.arange(count), start[width * k : width * k + width]) for k, b in enumerate(core)
     }
     column = count

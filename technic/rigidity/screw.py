@@ -42,9 +42,7 @@ def describe_twists(points: Array, twists: Array, length: float) -> TwistShape:
     """
     middle = points.mean(axis=0)
     moved = np.einsum("nij,nj->ni", shift_twist(middle - points), twists)
-    size = max(
-        float(np.abs(moved[:, :3]).max()), length * float(np.abs(moved[:, 3:]).max())
-    )
+    size = max(float(np.abs(moved[:, :3]).max()), length * float(np.abs(moved[:, 3:]).max()))
     spread = np.abs(moved - moved[0])
     if max(spread[:, :3].max(), length * spread[:, 3:].max()) > MOTION_KIND_CUT * size:
         return TwistShape(MotionType.GENERAL, None, None, 0.0)

@@ -100,12 +100,12 @@ class System:
         return slice(int(self.offsets[part]), int(self.offsets[part + 1]))
 
 
-def element_of(part: Part, points: Array, ports: tuple[str | None, ...]) -> Element:
+def element_of(part: Part, points: Array, _ports: tuple[str | None, ...]) -> Element:
     """Return the element of a part's own body (frame members or a rigid body)."""
     return build_element(part.body, part.mass_properties, points)
 
 
-def rigid_element_of(part: Part, points: Array, ports: tuple[str | None, ...]) -> Element:
+def rigid_element_of(part: Part, points: Array, _ports: tuple[str | None, ...]) -> Element:
     """Return the element of a part that is taken as rigid, whatever its body."""
     return build_element(RigidBody(), part.mass_properties, points)
 
@@ -156,28 +156,29 @@ def _elements(
     place: list[list[tuple[int, int]]] = []
     for point, parts, ports in links:
         row = []
-        for part, port in zip(parts, ports, strict=True):
-            local = assembly.parts[part].pose.to_local(point)
+        for index, port in zip(parts, ports, strict=True):
+            local = assembly.parts[index].pose.to_local(point)
             # rounding to a nanometre makes equal parts share one element
-            attached[part].append((local.round(9) + 0.0, port))
-            row.append((part, len(attached[part]) - 1))
+            attached[index].append((local.round(9) + 0.0, port))
+            row.append((index, len(attached[index]) - 1))
         place.append(row)
     cache: dict[object, Element] = {}
     elements = []
     for part, items in zip(assembly.parts, attached, strict=True):
         points = np.array([p for p, _ in items]).reshape(-1, 3)
-        ports = tuple(port for _, port in items)
-        key = (_identity(part.body, part.mass_properties, part.number), ports, points.tobytes())
+        names = tuple(port for _, port in items)
+        key = (_identity(part.body, part.mass_properties, part.number), names, points.tobytes())
         if key not in cache:
-            cache[key] = element(part, points, ports)
+            cache[key] = element(part, points, names)
         elements.append(cache[key])
     frames: list[tuple[Array | None, Array | None]] = []
     origins = np.zeros((len(links), 2, 3))
     for k, row in enumerate(place):
         pair: list[Array | None] = [None, None]
-        for side, (part, slot) in enumerate(row):
-            pair[side] = elements[part].frames[slot]
-            origins[k, side] = assembly.parts[part].pose.points(elements[part].frame_points[slot])
+        for side, (index, slot) in enumerate(row):
+            owner = elements[index]
+            pair[side] = owner.frames[slot]
+            origins[k, side] = assembly.parts[index].pose.points(owner.frame_points[slot])
         frames.append((pair[0], pair[1]))
     return tuple(elements), frames, origins
 
@@ -221,7 +222,7 @@ def _joint_matrix(
 
 def _block_diagonal(blocks: list[Array]) -> sparse.csr_array:
     """Return the block diagonal matrix; equal blocks (the same object) are read once."""
-    pattern: dict[int, tuple[Array, Array, Array]] = {}
+    pattern: dict[int, tuple[Array, NDArray[np.intp], NDArray[np.intp]]] = {}
     data, rows, columns = [], [], []
     row = column = 0
     for block in blocks:

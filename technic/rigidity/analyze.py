@@ -1,0 +1,233 @@
+"""The analysis: mobility, motions, worst-case rigidity, weak spots."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Literal
+
+import numpy as np
+from scipy import sparse
+
+from technic.assembly.model import Assembly, FindingKind
+from technic.geometry import Array
+from technic.rigidity.eigen import elastic_modes
+from technic.rigidity.kinematics import (
+    ComponentMotions,
+    Kinematics,
+    component_motions,
+    kinematics,
+)
+from technic.rigidity.motions import SortedMotions, sort_motions
+from technic.rigidity.result import (
+    Component,
+    Mobility,
+    Mode,
+    MotionKind,
+    Rigidity,
+    RigidityReport,
+    Verdict,
+)
+from technic.rigidity.sentences import motion_sentence, not_modelled, reason
+from technic.rigidity.worst_case import mode_of, node_fields, weak_spots
+from technic.system.assemble import ElementFactory, System, assemble, element_of, rigid_element_of
+from technic.tolerances import MAIN_COMPONENT_SHARE, MOBILITY_GAP
+
+__all__ = ["Measure", "PartModel", "analyze"]
+
+Measure = Literal["mean_square", "nodal"]
+PartModel = Literal["frame", "rigid"]
+
+FACTORIES: dict[str, ElementFactory] = {"frame": element_of, "rigid": rigid_element_of}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Body:
+    """One component on its way through the analysis."""
+
+    motions: ComponentMotions
+    sorted: SortedMotions
+    mobility: Mobility
+    verdict: Verdict
+
+
+def analyze(
+    assembly: Assembly,
+    *,
+    measure: Measure = "mean_square",
+    modes: int = 6,
+    parts: PartModel = "frame",
+) -> RigidityReport:
+    """Tell how rigid an assembly is.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    measure : {"mean_square", "nodal"}
+        What rigidity is measured against: the mean square displacement over the material (N/m,
+        independent of the mesh), or the unweighted node displacements of the paper.
+    modes : int
+        Elastic modes of the heaviest component.
+    parts : {"frame", "rigid"}
+        What parts are made of.
+
+    Returns
+    -------
+    RigidityReport
+
+    Raises
+    ------
+    NumericalError
+        The eigenvalue step failed.
+    """
+    timings: dict[str, float] = {}
+    with _timed(timings, "mobility"):
+        kin = kinematics(assembly)
+        bodies = [_body(kin, c) for c in range(len(kin.components))]
+    with _timed(timings, "assemble"):
+        system = assemble(assembly, element=FACTORIES[parts])
+    with _timed(timings, "eigen"):
+        found = [
+            _elastic(system, kin, body.motions, measure, modes if c == 0 else 1)
+            for c, body in enumerate(bodies)
+        ]
+    with _timed(timings, "weak_spots"):
+        main_modes = found[0][1] if found else ()
+        first = main_modes[0].unknowns if main_modes else None
+        spots = weak_spots(system, first) if first is not None else ()
+        fields = node_fields(system, first) if first is not None else ({}, {})
+    motions = tuple(
+        replace(m, sentence=motion_sentence(assembly, m))
+        for kind in MotionKind
+        for b in bodies
+        for m in b.sorted.motions
+        if m.kind is kind
+    )
+    mobility = _sum([b.mobility for b in bodies])
+    verdict = _verdict(assembly, kin, bodies)
+    return RigidityReport(
+        assembly=assembly,
+        verdict=verdict,
+        reason=reason(assembly, kin.components, verdict, mobility),
+        mobility=mobility,
+        motions=motions,
+        rigidity=found[0][0] if found else None,
+        modes=tuple(main_modes),
+        weak_spots=spots,
+        components=tuple(
+            Component(
+                parts=b.motions.parts,
+                mass=sum(assembly.parts[p].mass_properties.mass for p in b.motions.parts),
+                verdict=b.verdict,
+                mobility=b.mobility,
+                rigidity=rigidity,
+            )
+            for b, (rigidity, _) in zip(bodies, found, strict=True)
+        ),
+        unknowns=system.size,
+        mass=system.mass,
+        qualifier=_qualifier(assembly),
+        not_modelled=not_modelled(assembly),
+        timings=timings,
+        node_points=fields[0],
+        node_displacements=fields[1],
+    )
+
+
+def _body(kin: Kinematics, component: int) -> _Body:
+    motions = component_motions(kin, component)
+    kinds = sort_motions(kin, motions, component)
+    mobility = Mobility(
+        structural=kinds.structural,
+        spinning=kinds.spinning,
+        sliding=kinds.sliding,
+        idle=kinds.idle,
+        proof="numerical",
+        smallest_kept=motions.smallest_kept,
+        largest_dropped=motions.largest_dropped,
+    )
+    if motions.smallest_kept < MOBILITY_GAP * motions.largest_dropped:
+        verdict = Verdict.UNDETERMINED
+    else:
+        verdict = Verdict.FLEXIBLE if mobility.structural else Verdict.RIGID
+    return _Body(motions, kinds, mobility, verdict)
+
+
+def _elastic(
+    system: System, kin: Kinematics, motions: ComponentMotions, measure: Measure, count: int
+) -> tuple[Rigidity | None, tuple[Mode, ...]]:
+    """Return the rigidity and the lowest modes of one component."""
+    parts = list(motions.parts)
+    if len(parts) < 2 and not any(s.part == parts[0] for s in system.assembly.supports):
+        return None, ()
+    own = np.concatenate([np.arange(system.offsets[p], system.offsets[p + 1]) for p in parts])
+    member = np.isin(kin.component_of, kin.component_of[parts[0]])
+    rows = np.array([member[kin.owners[k][0]] for k in system.rows.link], dtype=bool)
+    elastic = rows & system.elastic
+    a = sparse.csr_array(system.A[elastic][:, own])
+    joints = a.T @ sparse.diags_array(system.rows.stiffness[elastic]) @ a
+    stiffness = sparse.csr_array(system.K[own][:, own] + joints)
+    mass = sum(system.assembly.parts[p].mass_properties.mass for p in parts)
+    full = system.mass_matrix / mass if measure == "mean_square" else system.nodal()
+    weight = sparse.csr_array(full[own][:, own])
+    constraints = sparse.csr_array(system.A[rows & ~system.elastic][:, own])
+    rigid = system.R[own][:, np.concatenate([np.arange(6 * p, 6 * p + 6) for p in parts])]
+    scale = sparse.diags_array(np.tile(kin.units, len(parts)))
+    moving = sparse.csc_array(rigid @ (scale @ motions.twists))
+    pairs = elastic_modes(stiffness, weight, constraints, moving, count)
+    if not len(pairs.values):
+        return None, ()
+    value = float(pairs.values[0])
+    frequency = float(np.sqrt(value / mass) / (2 * np.pi)) if measure == "mean_square" else None
+    rigidity = Rigidity(value, frequency, measure, float(pairs.residuals[0]))
+    if count == 1:
+        return rigidity, ()
+    out = []
+    for k in range(len(pairs.values)):
+        unknowns: Array = np.zeros(system.size)
+        unknowns[own] = pairs.vectors[:, k]
+        out.append(mode_of(system, float(pairs.values[k]), unknowns, measure))
+    return rigidity, tuple(out)
+
+
+def _verdict(assembly: Assembly, kin: Kinematics, bodies: list[_Body]) -> Verdict:
+    structure = [not p.fastener for p in assembly.parts]
+    total = sum(structure)
+    biggest = max((sum(structure[p] for p in c) for c in kin.components), default=0)
+    if total and biggest < MAIN_COMPONENT_SHARE * total:
+        return Verdict.DISCONNECTED
+    verdicts = {b.verdict for b in bodies}
+    for verdict in (Verdict.UNDETERMINED, Verdict.FLEXIBLE):
+        if verdict in verdicts:
+            return verdict
+    return Verdict.RIGID
+
+
+def _sum(parts: list[Mobility]) -> Mobility:
+    return Mobility(
+        structural=sum(m.structural for m in parts),
+        spinning=sum(m.spinning for m in parts),
+        sliding=sum(m.sliding for m in parts),
+        idle=sum(m.idle for m in parts),
+        proof="exact" if parts and all(m.proof == "exact" for m in parts) else "numerical",
+        smallest_kept=min((m.smallest_kept for m in parts), default=float("inf")),
+        largest_dropped=max((m.largest_dropped for m in parts), default=0.0),
+    )
+
+
+def _qualifier(assembly: Assembly) -> str:
+    """Unknown parts may hold what seems to move, and may move themselves: then a count is a bound."""
+    if assembly.unknown:
+        return "at most"
+    if any(f.kind is FindingKind.OFF_GRID for f in assembly.findings):
+        return "at least"
+    return ""
+
+
+@contextmanager
+def _timed(timings: dict[str, float], name: str) -> Iterator[None]:
+    start = perf_counter()
+    yield
+    timings[name] = perf_counter() - start
