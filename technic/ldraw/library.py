@@ -1,7 +1,7 @@
-"""Access to an LDraw parts library: a folder or a zip, read as it is.
+r"""Access to an LDraw parts library: a folder or a zip, read as it is.
 
 A library is a set of text files below ``parts``, ``p``, ``models`` and ``unofficial``. Names are
-case-insensitive and ``\\`` equals ``/``. The list of files is cached in the user's cache folder, so
+case-insensitive and ``\`` equals ``/``. The list of files is cached in the user's cache folder, so
 that the full library of more than forty thousand files opens at once the second time.
 
 Everything read here comes from outside: sizes, nesting and references are bounded, and a reference
@@ -44,12 +44,12 @@ _DRIVE = re.compile(r"^[a-z]:")
 
 
 def reference_key(name: str) -> str:
-    """Return the form of a referenced name under which a library lists it.
+    r"""Return the form of a referenced name under which a library lists it.
 
     Parameters
     ----------
     name : str
-        As written in the file, e.g. ``"s\\\\3001s01.DAT"``.
+        As written in the file, e.g. ``"s\\3001s01.DAT"``.
 
     Returns
     -------
@@ -176,7 +176,7 @@ class Library:
         """Yield the numbers of all parts (files directly below ``parts``), sorted."""
         seen = set()
         for store in self.stores:
-            for key in store.keys():
+            for key in store.keys():  # noqa: SIM118 (a store is no mapping)
                 for folder in ("parts/", "unofficial/parts/"):
                     tail = key.removeprefix(folder)
                     if tail != key and "/" not in tail and tail.endswith(".dat"):
@@ -199,6 +199,11 @@ class Library:
             if key in store:
                 return key
         return None
+
+    def key_of(self, number: str) -> str | None:
+        """Return the path of the file of a part number, with or without ``.dat``, or None."""
+        name = number.strip().lower()
+        return self.find(name if name.endswith((".dat", ".ldr", ".mpd")) else f"{name}.dat")
 
     def text(self, key: str) -> str:
         """Return the text of the file at `key` (as returned by `find`).
@@ -242,8 +247,7 @@ class Library:
         number : str
             With or without ``.dat``.
         """
-        name = number if "." in number else f"{number}.dat"
-        key = self.find(name)
+        key = self.key_of(number)
         if key is None:
             return None
         matrix, offset, via = np.eye(3), np.zeros(3), [key]

@@ -14,11 +14,13 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from technic.errors import InputError
 from technic.geometry import Array
-from technic.ldraw.features import Feature, Piece, PieceKind, build_features, to_ports
+from technic.ldraw.features import Feature, build_features, to_ports
 from technic.ldraw.library import Library
+from technic.ldraw.pieces import Piece, PieceKind
 from technic.parts.definition import Port
 
 __all__ = [
@@ -45,9 +47,8 @@ RULES: Final[dict[str, tuple[Rule, ...]]] = {
     "connhol3": ((K.MOUTH, -10.0, -8.0), (K.WALL, -8.0, 8.0)),
     "beamhole": ((K.HOLE, -10.0, 10.0),),
     "beamhol2": ((K.HOLE, -5.0, 5.0),),
-    **{
-        name: ((K.AXLE_HOLE, *_UNIT),)
-        for name in (
+    **dict.fromkeys(
+        (
             "axlehole",
             "axlehol4",
             "axlehol5",
@@ -60,8 +61,9 @@ RULES: Final[dict[str, tuple[Rule, ...]]] = {
             "axl4hole",
             "axl5hole",
             "axl5hol8",
-        )
-    },
+        ),
+        ((K.AXLE_HOLE, *_UNIT),),
+    ),
     "axle": ((K.AXLE, *_UNIT),),
     "axlehol8": ((K.AXLE_PERIMETER, *_UNIT),),
     "axleho12": ((K.AXLE, *_UNIT),),
@@ -124,7 +126,7 @@ class Occurrence:
 
     matrices: Array
     offsets: Array
-    inverted: Array
+    inverted: NDArray[np.bool_]
 
 
 class Walker:

@@ -1,0 +1,146 @@
+"""Definitions of parts that the catalogue does not have, made from an LDraw library.
+
+A definition so made is a rigid body with ports; its mass comes from its surface, where that is closed
+well enough, else from its box. What was estimated is said in `PartDefinition.source`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from technic.ldraw.library import Library
+from technic.ldraw.primitives import ports_from_primitives
+from technic.ldraw.shadow import ShadowLibrary
+from technic.ldraw.shadow_ports import ports_from_shadow
+from technic.ldraw.triangles import Surface, surface_of
+from technic.parts.definition import MassProperties, PartDefinition, Port, PortKind, RigidBody
+from technic.parts.materials import material
+from technic.units import PITCH
+
+__all__ = ["definition_from_library", "is_fastener", "mass_of"]
+
+FAMILY: Final = "library"
+
+CLOSED: Final = 0.03
+"""Largest gap of a surface (see `SurfaceIntegrals`) whose enclosed volume is trusted: of 244 Technic
+parts 224 are below, most of them below 1e-3."""
+
+FILL: Final = 0.32
+"""Share of its box that a part fills: the median of those 224 parts (10th to 90th percentile 0.17 to
+0.53)."""
+
+BUSH_SIZE: Final = 1.2 * PITCH
+"""Largest size of a bush: 1L and its flanges."""
+
+
+def definition_from_library(
+    library: Library, number: str, shadow: ShadowLibrary | None = None
+) -> PartDefinition | None:
+    """Return a definition of a part from its library files.
+
+    Parameters
+    ----------
+    library : Library
+    number : str
+        LDraw number, with or without ``.dat``. Moved-to stubs are followed; the definition is in the
+        coordinates of the number asked for.
+    shadow : ShadowLibrary, optional
+        Its ports win over those from primitives, where it describes the part.
+
+    Returns
+    -------
+    PartDefinition or None
+        None when the library does not have the part.
+
+    Raises
+    ------
+    InputError
+        The part's files are broken or absurdly big.
+    """
+    resolved = library.resolve(number)
+    surface = surface_of(library, number, fine=False)
+    if resolved is None or surface is None:
+        return None
+    ports = None if shadow is None else ports_from_shadow(library, shadow, number)
+    origin = "ports from the LDCad shadow library"
+    if ports is None:
+        ports = ports_from_primitives(library, number) or ()
+        origin = "ports from LDraw primitives"
+    title = _title(library.file(resolved.key).title)
+    mass, measured = mass_of(surface)
+    return PartDefinition(
+        id=number.lower().removesuffix(".dat"),
+        title=title,
+        family=FAMILY,
+        ports=ports,
+        body=RigidBody(),
+        mass_properties=mass,
+        fastener=is_fastener(ports, title, surface),
+        source=f"LDraw library {resolved.key}; {origin}; {measured}",
+    )
+
+
+def _title(text: str) -> str:
+    """Return the title of a part without marks of the library (``~ = _ |``) and double spaces."""
+    return re.sub(r"\s+", " ", text.lstrip("~=_|")).strip()
+
+
+def mass_of(surface: Surface) -> tuple[MassProperties, str]:
+    """Return mass properties of a part of ABS, and how they were found.
+
+    Parameters
+    ----------
+    surface : Surface
+
+    Returns
+    -------
+    MassProperties
+        Zero mass when there is no surface (a part file that draws nothing).
+    str
+        Half a sentence for `PartDefinition.source`.
+    """
+    if not len(surface.triangles):
+        zero = MassProperties(0.0, np.zeros(3), np.zeros((3, 3)))
+        return zero, "no surface, no mass"
+    density = material().density
+    low, high = surface.bounds
+    box = float(np.prod(high - low))
+    integrals = surface.integrals()
+    volume, centroid = integrals.volume, integrals.centroid
+    inside = bool(((centroid >= low) & (centroid <= high)).all())
+    if integrals.gap <= CLOSED and 0.0 < volume <= box and inside:
+        moments = integrals.second_moments - volume * np.outer(centroid, centroid)
+        inertia = density * (np.trace(moments) * np.eye(3) - moments)
+        if np.linalg.eigvalsh(inertia)[0] > 0.0:
+            return MassProperties(density * volume, centroid, inertia), "mass from the surface"
+    size = np.maximum(high - low, 1e-6)
+    mass = density * FILL * float(np.prod(size))
+    inertia = np.diag(mass / 12.0 * (size @ size - size**2))
+    return MassProperties(mass, (low + high) / 2.0, inertia), "mass estimated from the box"
+
+
+def is_fastener(ports: Sequence[Port], title: str, surface: Surface) -> bool:
+    """Tell whether a part joins others and carries no structure of its own: pins, axles, bushes.
+
+    Its pins and axles lie on one line and there is nothing else but what sits on that line, or it is
+    a bush: a small part with one axle hole.
+    """
+    male = [port for port in ports if port.kind in (PortKind.PIN, PortKind.AXLE)]
+    if male:
+        first = male[0]
+        for port in ports:
+            across = np.cross(port.position - first.position, first.axis)
+            if np.linalg.norm(across) > PITCH / 8 or port.kind is PortKind.PIN_HOLE:
+                return False
+            aligned = abs(float(port.axis @ first.axis)) > 0.99
+            if not aligned and port.kind is not PortKind.BALL:
+                return False
+        return True
+    if ports and all(port.kind is PortKind.AXLE_HOLE for port in ports):
+        size = np.ptp(surface.bounds, axis=0)
+        return "bush" in title.lower() and float(size.max()) <= BUSH_SIZE
+    return False
