@@ -121,4 +121,4 @@ def test_installed_wheel_runs_the_demo(wheel: Path, tmp_path: Path) -> None:
     assert report["rigidity"]["value_n_per_m"] > 0
     assert report["model"]["unknown_parts"] == []
     assert sum(w["energy_share"] for w in report["weak_spots"]) <= 1 + 1e-9
-    assert list(elsewhere.iterdir()) == [], "the demo leaves files behind that nobody asked for"
+    assert {path.name for path in elsewhere.iterdir()} <= {"technic-demo.png"}
