@@ -21,6 +21,7 @@ from technic.geometry import Array, axes_from, readonly
 from technic.ldraw.findings import find
 from technic.ldraw.matching import Limits, Mating, match
 from technic.ldraw.placed import PlacedPorts, collect
+from technic.ldraw.seats import Seat, seats
 from technic.ldraw.stops import missing_stops
 
 __all__ = ["AxleSlide", "connect"]
@@ -71,6 +72,10 @@ def connect(
         else:
             joint = _joint(placed, first, table, joint_id, axle_slide, missing.get(group[0], ""))
         by_pair.setdefault(pair, []).append(joint)
+    for seat in seats(parts, limits):
+        number = len(by_pair.get(seat.parts, [])) + 1
+        joint_id = f"{parts[seat.parts[0]].id}~{parts[seat.parts[1]].id}@{number}"
+        by_pair.setdefault(seat.parts, []).append(_seat(seat, table, joint_id))
     joints = tuple(joint for pair in sorted(by_pair) for joint in by_pair[pair])
     return joints, find(placed, matched, joints, limits)
 
@@ -147,6 +152,23 @@ def _studs(
     stiffness[4] += single[0] * float(z @ z)
     stiffness[5] += single[0] * float(y @ y)
     return _build(placed, first, entry, JointType.FIXED, stiffness, joint_id, axes, "", middle)
+
+
+def _seat(seat: Seat, table: StiffnessTable, joint_id: str) -> Joint:
+    entry = table.get(seat.connection)
+    held = entry.held()
+    return Joint(
+        id=joint_id,
+        type=entry.type,
+        parts=seat.parts,
+        point=seat.point,
+        axes=_axes(*seat.axis),
+        held=held,
+        stiffness=np.where(held, entry.vector(), 0.0),
+        connection=seat.connection,
+        provenance=entry.provenance(held),
+        offset=seat.offset,
+    )
 
 
 def _build(

@@ -11,10 +11,11 @@ from technic.assembly.joint_types import JointType
 from technic.assembly.stiffness import MOTIONS, default_table, read_table
 from technic.errors import InputError, SchemaError, UsageError
 from technic.ldraw.matching import MATES
+from technic.ldraw.seats import TURNTABLE, TYRE
 
 
 def test_every_connection_has_an_entry():
-    assert set(MATES.values()) <= set(default_table().connections)
+    assert {*MATES.values(), TYRE, TURNTABLE} == set(default_table().connections)
 
 
 def test_pin_has_the_papers_values():
@@ -31,8 +32,9 @@ def test_other_connections_have_the_papers_default_and_say_it_is_assumed():
             continue
         assert {v.provenance for v in entry.values.values()} == {"assumed"}
         for motion, value in entry.values.items():
-            assert value.value == (1e4 if motion in ("axial", "shear") else 0.16)
-            assert math.isclose(1e4 * 0.004**2, 0.16)
+            arm = 0.02 if key == "turntable/turntable" else 0.004
+            expected = 1e4 if motion in ("axial", "shear") else 1e4 * arm**2
+            assert math.isclose(value.value, expected)
 
 
 def test_every_provenance_has_a_source():

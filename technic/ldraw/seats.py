@@ -1,0 +1,143 @@
+"""Parts that belong to each other without a connector: tyres on rims, the two halves of a turntable.
+
+Neither has a pin, an axle or a stud. They are recognised by what they are (family or LDraw title) and
+by lying on one line at one place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from technic.assembly.model import Part
+from technic.geometry import Array
+from technic.ldraw.matching import Limits
+from technic.parts.definition import PortKind
+from technic.units import PITCH
+
+__all__ = ["TURNTABLE", "TYRE", "Seat", "seats"]
+
+TYRE = "tyre/rim"
+TURNTABLE = "turntable/turntable"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seat:
+    """Two parts that belong to each other.
+
+    Parameters
+    ----------
+    connection : str
+        Key of the stiffness table.
+    parts : (int, int)
+        Ascending.
+    point, axis : (3,) ndarray
+        Their common line (m).
+    offset : float
+        How far apart their lines are (m).
+    """
+
+    connection: str
+    parts: tuple[int, int]
+    point: Array
+    axis: Array
+    offset: float
+
+
+def seats(parts: Sequence[Part], limits: Limits) -> list[Seat]:
+    """Return the tyres on rims and the turntables of a model, in the order of the parts.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+    limits : Limits
+        How far apart their lines may be.
+    """
+    tyres = [k for k, part in enumerate(parts) if _is(part, "tyre")]
+    rims = [k for k, part in enumerate(parts) if _is(part, "wheel") and k not in tyres]
+    halves = [k for k, part in enumerate(parts) if _is(part, "turntable")]
+    found: list[Seat] = []
+    taken: set[int] = set()
+    for tyre in tyres:
+        lines = {k: _bore(parts[k]) for k in rims if k not in taken}
+        best = _nearest(tyre, _ring(parts[tyre]), lines, PITCH, limits, TYRE)
+        if best is not None:
+            taken.update(best.parts)
+            found.append(best)
+    for half in halves:
+        if half in taken:
+            continue
+        lines = {
+            k: _upright(parts[k])
+            for k in halves
+            if k > half and k not in taken and parts[k].number != parts[half].number
+        }
+        best = _nearest(half, _upright(parts[half]), lines, PITCH / 2.0, limits, TURNTABLE)
+        if best is not None:
+            taken.update(best.parts)
+            found.append(best)
+    return sorted(found, key=lambda seat: seat.parts)
+
+
+def _is(part: Part, what: str) -> bool:
+    """Return whether a part is of a kind, by its family or by its title in the LDraw manner."""
+    definition = part.definition
+    if definition is None:
+        return False
+    title = definition.title.lower().lstrip("~=_| ").removeprefix("technic ")
+    return definition.family.split("-")[0] == what or title.split(" ")[0] == what
+
+
+_Line = tuple[Array, Array]
+"""Point and unit direction, world coordinates."""
+
+
+def _ring(part: Part) -> _Line:
+    """Return the axis of a round part: the principal axis of inertia unlike the other two."""
+    moments, axes = np.linalg.eigh(part.mass_properties.inertia)
+    odd = 2 if moments[2] - moments[1] > moments[1] - moments[0] else 0
+    return part.centroid, part.pose.directions(axes[:, odd])
+
+
+def _bore(part: Part) -> _Line | None:
+    """Return the line of the bore nearest to a wheel's middle; None when it has none."""
+    bores = [p for p in part.ports if p.kind in (PortKind.PIN_HOLE, PortKind.AXLE_HOLE)]
+    if not bores:
+        return None
+    middle = part.mass_properties.centroid
+    bore = min(bores, key=lambda p: float(np.linalg.norm(np.cross(middle - p.position, p.axis))))
+    return part.centroid, part.pose.directions(bore.axis)
+
+
+def _upright(part: Part) -> _Line:
+    """Return the axis of half a turntable: LDraw draws both halves about y, around one origin."""
+    return part.pose.points(np.zeros(3)), part.pose.directions(np.array([0.0, 1.0, 0.0]))
+
+
+def _nearest(
+    this: int,
+    line: _Line,
+    others: dict[int, _Line | None],
+    reach: float,
+    limits: Limits,
+    connection: str,
+) -> Seat | None:
+    """Return the seat on the nearest part whose line is this line, at most `reach` (m) along it."""
+    point, axis = line
+    best: tuple[float, Seat] | None = None
+    for k, other in others.items():
+        if other is None or np.linalg.norm(np.cross(axis, other[1])) > np.sin(limits.angle):
+            continue
+        between = other[0] - point
+        along = float(between @ axis)
+        offset = float(np.linalg.norm(between - along * axis))
+        if (
+            offset <= limits.offset
+            and abs(along) <= reach
+            and (best is None or abs(along) < best[0])
+        ):
+            pair = (min(this, k), max(this, k))
+            best = (abs(along), Seat(connection, pair, point, axis, offset))
+    return None if best is None else best[1]

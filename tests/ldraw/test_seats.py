@@ -1,0 +1,83 @@
+"""Parts that belong to each other without a connector: tyres and turntables."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from technic.assembly.joint_types import JointType
+from technic.assembly.stiffness import default_table
+from technic.ldraw.connect import connect
+from technic.parts.definition import MassProperties
+from technic.units import LDU
+from tests.ldraw.bricks import Z, beam, define, place, port, rotation, turn
+
+
+def tyre():
+    """Return a tyre about z: its inertia says so."""
+    ring = MassProperties(5e-3, np.zeros(3), np.diag([1.0, 1.0, 1.8]) * 1e-6)
+    plain = define("61481", "Tyre 26/ 24 x 30", [])
+    return replace(plain, family="tyre", mass_properties=ring)
+
+
+def rim():
+    """Return a rim about z, its axle hole off the middle."""
+    return define("56145", "Wheel Rim 20 x 30", [port("hole", "axle_hole", [0, 0, -10], Z, 20)])
+
+
+def half(number):
+    """Return half a turntable about y."""
+    side = [port("hole", "pin_hole", [20, 20 if number == "99009" else -20, 0], Z, 20)]
+    return define(number, "Technic Turntable 28 Tooth", side)
+
+
+def joints_of(parts):
+    return connect(parts, default_table())[0]
+
+
+def test_a_tyre_is_fixed_to_its_rim():
+    turned = turn("z", "x")
+    parts = [place(tyre(), [100, 0, 0], turned), place(rim(), [100, 0, 0], turned)]
+    (joint,) = joints_of(parts)
+    assert joint.type is JointType.FIXED
+    assert joint.connection == "tyre/rim"
+    assert joint.parts == (0, 1)
+    np.testing.assert_allclose(joint.point / LDU, [100, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(np.abs(joint.axes[0]), [1, 0, 0], atol=1e-9)
+
+
+def test_a_tyre_takes_the_rim_it_sits_on():
+    parts = [place(tyre(), [0, 0, 2]), place(rim(), [0, 0, 18]), place(rim(), [0, 0, 0])]
+    assert [joint.parts for joint in joints_of(parts)] == [(0, 2)]
+
+
+def test_two_tyres_take_two_rims():
+    parts = [place(kind(), [0, 0, z], rotation(Z, 31)) for kind in (tyre, rim) for z in (0, 40)]
+    assert [joint.parts for joint in joints_of(parts)] == [(0, 2), (1, 3)]
+
+
+@pytest.mark.parametrize("position", [[0, 0, 25], [10, 0, 0]], ids=["further along", "beside"])
+def test_a_tyre_elsewhere_is_loose(position):
+    assert not joints_of([place(tyre(), position), place(rim(), [0, 0, 0])])
+
+
+def test_a_tyre_across_is_loose():
+    assert not joints_of([place(tyre(), [0, 0, 0], turn("z", "x")), place(rim(), [0, 0, 0])])
+
+
+def test_the_halves_of_a_turntable_turn():
+    parts = [
+        place(half("99009"), [20, -20, -80]),
+        place(half("99010"), [20, -20, -80], turn("z", "x")),
+        place(beam(3), [0, 500, 0]),
+    ]
+    (joint,) = joints_of(parts)
+    assert joint.type is JointType.HINGE
+    assert joint.connection == "turntable/turntable"
+    np.testing.assert_allclose(np.abs(joint.axes[0]), [0, 1, 0], atol=1e-9)
+
+
+def test_two_equal_halves_are_no_turntable():
+    assert not joints_of([place(half("99009"), [0, 0, 0]), place(half("99009"), [0, 0, 0])])
