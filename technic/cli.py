@@ -58,7 +58,7 @@ def main() -> None:
         app(prog_name="technic")
     except TechnicError as error:
         sys.stdout.flush()
-        print(f"technic: {error}", file=sys.stderr)
+        typer.echo(f"technic: {error}", err=True)
         sys.exit(error.exit_code)
     except BrokenPipeError:
         # The reader (head, less) has what it wanted. Python would complain again at exit.

@@ -19,6 +19,7 @@ from technic.report.wording import (
     part_name,
     part_names,
     place,
+    spot_words,
 )
 from technic.rigidity.result import Motion, MotionKind, RigidityReport, Verdict
 from technic.rigidity.serialize import joint_stiffness, size_mm, spot_place, unit_load
@@ -144,11 +145,8 @@ def _motions(report: RigidityReport, style: Style) -> list[str]:
         if len(motions) > _HARMLESS_SHOWN:
             lines.append("     " + _more(len(motions) - _HARMLESS_SHOWN))
     if mobility.idle:
-        lines += [
-            "",
-            f"{count(mobility.idle, 'pin or other fastener', 'pins and other fasteners')} "
-            f"{'turns' if mobility.idle == 1 else 'turn'} in place: harmless.",
-        ]
+        idle = count(mobility.idle, "pin or other fastener turns", "pins and other fasteners turn")
+        lines += ["", f"{idle} in place: harmless."]
     return lines
 
 
@@ -218,10 +216,8 @@ def _weak_spots(report: RigidityReport, style: Style) -> list[str]:
     shown = report.weak_spots[:_SPOTS_SHOWN]
     lines = ["", style("bold", "Weakest spots (share of the strain energy of the softest way)")]
     for spot in shown:
-        names = [part_name(assembly.parts[k]) for k in spot.parts]
-        what = f"joint of {joined(names)}" if spot.kind == "joint" else f"bending of {names[0]}"
         lines += style.wrap(
-            f"{what}; {place(spot_place(assembly, spot))}",
+            f"{spot_words(assembly, spot)}; {place(spot_place(assembly, spot))}",
             f" {spot.rank:2d}. {100.0 * spot.energy_share:4.1f} %  ",
             "             ",
         )

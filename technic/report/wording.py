@@ -11,6 +11,7 @@ import numpy as np
 from technic.assembly.model import Assembly, Part
 from technic.geometry import Array
 from technic.report.palette import color_name
+from technic.rigidity.result import WeakSpot
 
 __all__ = [
     "AXIS_WORDS",
@@ -22,6 +23,7 @@ __all__ = [
     "part_name",
     "part_names",
     "place",
+    "spot_words",
 ]
 
 DIRECTION_WORDS = {
@@ -104,3 +106,13 @@ def part_names(assembly: Assembly, parts: Sequence[int], limit: int = 3) -> str:
     if rest:
         said.append(f"{rest} more")
     return joined(said)
+
+
+def spot_words(assembly: Assembly, spot: WeakSpot) -> str:
+    """Return what gives way at a weak spot: "bending of a beam", or "pin in beam" for a joint."""
+    parts = sorted((assembly.parts[k] for k in spot.parts), key=lambda part: not part.fastener)
+    names = [part_name(part) for part in parts]
+    if spot.kind != "joint":
+        return f"bending of {names[0]}"
+    word = "in" if parts[0].fastener and not parts[-1].fastener else "with"
+    return f" {word} ".join(names)

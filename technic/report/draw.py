@@ -1,0 +1,127 @@
+"""The drawing process: reads a scene from standard input, writes a PNG to standard output.
+
+Run as ``python -m technic.report.draw`` by `technic.report.render`. VTK draws the panels; Pillow puts
+title, captions, scale bar, markers and legend around them, each in a place of its own.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import pickle
+import sys
+from typing import Any
+
+import numpy as np
+import pyvista
+from numpy.typing import NDArray
+
+from technic.report.layout import Sheet
+from technic.report.scene import Lines, Panel, Scene, Surface
+
+__all__ = ["main", "paint"]
+
+_IN_FRONT = -66000.0
+"""Depth offset (in units of the depth buffer) that lifts arrows over all parts."""
+
+
+def _cells(indices: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return indices (n, k) in VTK's cell format: each row preceded by its length."""
+    rows, size = indices.shape
+    return np.hstack([np.full((rows, 1), size), indices]).ravel()
+
+
+def _colors(colors: Any) -> NDArray[np.uint8]:
+    return np.asarray(np.round(np.clip(colors, 0.0, 1.0) * 255.0), dtype=np.uint8)
+
+
+def _add_surface(plotter: pyvista.Plotter, surface: Surface) -> None:
+    mesh = pyvista.PolyData(surface.points.astype(np.float32), _cells(surface.faces))
+    mesh.point_data["rgb"] = _colors(surface.colors)
+    actor = plotter.add_mesh(
+        mesh,
+        scalars="rgb",
+        rgb=True,
+        opacity=surface.opacity,
+        smooth_shading=False,
+        ambient=0.5 if surface.on_top else 0.42,
+        diffuse=0.7,
+        specular=0.0 if surface.on_top else 0.08,
+        reset_camera=False,
+    )
+    if surface.on_top:
+        mapper = actor.mapper
+        mapper.SetResolveCoincidentTopologyToPolygonOffset()
+        mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(0.0, _IN_FRONT)
+
+
+def _add_lines(plotter: pyvista.Plotter, lines: Lines) -> None:
+    if not len(lines.segments):
+        return
+    mesh = pyvista.PolyData(lines.points.astype(np.float32), lines=_cells(lines.segments))
+    mesh.point_data["rgb"] = _colors(lines.colors)
+    actor = plotter.add_mesh(
+        mesh,
+        scalars="rgb",
+        rgb=True,
+        opacity=lines.opacity,
+        line_width=lines.width,
+        lighting=False,
+        reset_camera=False,
+    )
+    mapper = actor.mapper
+    mapper.SetResolveCoincidentTopologyToPolygonOffset()
+    mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, -4.0)
+
+
+def paint(panel: Panel, size: tuple[int, int]) -> tuple[NDArray[np.uint8], float]:
+    """Return the picture of one panel, (height, width, 3), and its pixels per metre."""
+    plotter = pyvista.Plotter(off_screen=True, window_size=list(size), lighting="light kit")
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("msaa", multi_samples=8)
+    for lines in panel.lines:
+        _add_lines(plotter, lines)
+    for surface in panel.surfaces:
+        _add_surface(plotter, surface)
+    view = panel.camera
+    half = max(view.half_height, view.half_width * size[1] / size[0])
+    camera = plotter.camera
+    camera.parallel_projection = True
+    everything = np.concatenate([s.points for s in panel.surfaces])
+    distance = 3.0 * float(np.linalg.norm(np.ptp(everything, axis=0))) + half
+    camera.focal_point = tuple(view.center)
+    camera.position = tuple(view.center + distance * view.toward)
+    camera.up = tuple(view.up)
+    camera.parallel_scale = half
+    plotter.reset_camera_clipping_range()
+    image = plotter.screenshot(return_img=True)
+    plotter.close()
+    return np.asarray(image)[:, :, :3], 0.5 * size[1] / half
+
+
+def draw(scene: Scene) -> bytes:
+    """Return the picture of a scene as PNG."""
+    sheet = Sheet(scene)
+    for panel, box in zip(scene.panels, sheet.boxes, strict=True):
+        width, height = box[2] - box[0], box[3] - box[1]
+        pixels, pixels_per_metre = paint(panel, (width, height))
+        sheet.place(panel, box, pixels, pixels_per_metre)
+    stream = io.BytesIO()
+    sheet.image.save(stream, format="PNG", optimize=False)
+    return stream.getvalue()
+
+
+def main() -> None:
+    """Read a scene, write a picture."""
+    # Libraries that print must not spoil the picture: they get standard error.
+    output = os.dup(1)
+    os.dup2(2, 1)
+    scene = pickle.loads(sys.stdin.buffer.read())
+    if not isinstance(scene, Scene):
+        raise TypeError("standard input is not a scene")
+    with os.fdopen(output, "wb") as stream:
+        stream.write(draw(scene))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,338 @@
+"""From a report to the scene of its picture.
+
+Left, when something can move: the motions, green. Right, or alone: the model deformed by its worst-case
+load (orange) over its undeformed outline, exaggerated by a stated factor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from technic.assembly.model import Assembly
+from technic.geometry import Array
+from technic.parts.definition import PartDefinition
+from technic.report.arrows import arrow
+from technic.report.camera import fit, view_direction
+from technic.report.deform import bend_field, move_rigidly
+from technic.report.motion_picture import MOTION_COLOR, motion_layers
+from technic.report.palette import NEUTRAL, color_rgb
+from technic.report.scene import (
+    RGB,
+    LegendItem,
+    Lines,
+    Marker,
+    Panel,
+    Scene,
+    Surface,
+    merge,
+)
+from technic.report.solids import Solid, solid_of, world_points
+from technic.report.wording import count, number, spot_words
+from technic.rigidity.result import RigidityReport, Verdict
+from technic.rigidity.serialize import unit_load
+from technic.units import MM
+
+__all__ = ["Drawing", "drawing_of", "part_scene", "report_scene"]
+
+LOAD_COLOR: RGB = (0.96, 0.49, 0.0)
+OUTLINE: RGB = (0.55, 0.57, 0.60)
+SPOT_COLOR: RGB = (0.80, 0.07, 0.18)
+
+_DEFORMED_SHARE = 0.07
+"""The furthest point of the deformed shape goes this share of the model's diagonal."""
+
+_ARROW_SHARE = 0.16
+_ARROW_RADIUS = 0.0045
+_ARROWS = 24
+_FAINT = 0.2
+"""Forces below this share of the largest are not drawn; the legend says so."""
+
+_SPOTS = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawing:
+    """The undeformed model ready to be drawn.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    solids : tuple of Solid
+        One per part.
+    points : tuple of (n, 3) ndarray
+        World points of each solid (m).
+    diagonal : float
+        Of the box around everything (m).
+    """
+
+    assembly: Assembly
+    solids: tuple[Solid, ...]
+    points: tuple[Array, ...]
+    diagonal: float
+
+
+def drawing_of(assembly: Assembly) -> Drawing:
+    """Return the shapes of all parts in their places."""
+    solid = solid_of()
+    solids = tuple(solid(part) for part in assembly.parts)
+    points = tuple(world_points(part, s) for part, s in zip(assembly.parts, solids, strict=True))
+    everything = np.concatenate(points)
+    return Drawing(assembly, solids, points, float(np.linalg.norm(np.ptp(everything, axis=0))))
+
+
+def _edge_color(color: RGB) -> RGB:
+    """Return a colour for edges that shows on the part: dark on light parts, light on black ones."""
+    brightness = 0.3 * color[0] + 0.6 * color[1] + 0.1 * color[2]
+    return (0.55, 0.58, 0.60) if brightness < 0.25 else (0.12, 0.13, 0.14)
+
+
+def model_layers(
+    drawing: Drawing, points: tuple[Array, ...], *, pale: float = 0.0
+) -> tuple[Surface, Lines]:
+    """Return the model in its colours, with its edges, at the given points.
+
+    Parameters
+    ----------
+    drawing : Drawing
+    points : tuple of (n, 3) ndarray
+        World points of each part.
+    pale : float
+        0 for full colours, 1 for white.
+    """
+    # Edges keep their strength: they carry the shape when the colours are pale.
+    surfaces, edges, edge_colors, start = [], [], [], 0
+    for part, solid, where in zip(drawing.assembly.parts, drawing.solids, points, strict=True):
+        full = np.array(color_rgb(part.color))
+        color = full + pale * (1.0 - full)
+        faces = solid.faces[:, ::-1] if np.linalg.det(part.pose.rotation) < 0 else solid.faces
+        surfaces.append(Surface(where, faces, np.tile(color, (len(where), 1))))
+        line = np.array(_edge_color(color_rgb(part.color)))
+        edges.append(solid.edges + start)
+        edge_colors.append(np.tile(line, (len(where), 1)))
+        start += len(where)
+    body = merge(surfaces)
+    return body, Lines(body.points, np.concatenate(edges), np.concatenate(edge_colors), width=1.3)
+
+
+def outline(drawing: Drawing, points: tuple[Array, ...]) -> Lines:
+    """Return the edges of the model as thin grey lines."""
+    edges, start = [], 0
+    for solid, where in zip(drawing.solids, points, strict=True):
+        edges.append(solid.edges + start)
+        start += len(where)
+    everything = np.concatenate(points)
+    return Lines(
+        everything,
+        np.concatenate(edges),
+        np.tile(np.array(OUTLINE), (len(everything), 1)),
+        width=1.0,
+        opacity=0.7,
+    )
+
+
+def _nice(value: float) -> float:
+    """Return a round number not above `value`: 1, 1.5, 2, 3, 5 or 7 times a power of ten."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(m for m in (1.0, 1.5, 2.0, 3.0, 5.0, 7.0) if m * power <= value))
+
+
+def deformed_points(
+    report: RigidityReport, drawing: Drawing, twists: Array, scale: float
+) -> tuple[Array, ...]:
+    """Return the world points of each part, moved by `scale` times the worst mode at 1 N."""
+    moved = []
+    per_newton = 1.0 / report.modes[0].value
+    for k, (part, where) in enumerate(zip(report.assembly.parts, drawing.points, strict=True)):
+        center = part.centroid
+        points = move_rigidly(where, center, scale * twists[k])
+        if k in report.node_points:
+            nodes = np.asarray(report.node_points[k])
+            whole = per_newton * np.asarray(report.node_displacements[k])
+            points = points + scale * bend_field(where, center, twists[k], nodes, whole)
+        moved.append(points)
+    return tuple(moved)
+
+
+def _furthest(report: RigidityReport, drawing: Drawing, twists: Array) -> float:
+    """Return how far the furthest point goes at 1 N (m), to first order."""
+    best = 0.0
+    for k, (part, where) in enumerate(zip(report.assembly.parts, drawing.points, strict=True)):
+        arms = where - part.centroid
+        way = twists[k, :3] + np.cross(twists[k, 3:], arms)
+        best = max(best, float(np.linalg.norm(way, axis=1).max()))
+    return best
+
+
+def _load_arrows(
+    drawing: Drawing, forces: Array, points: tuple[Array, ...]
+) -> tuple[Surface | None, float, int]:
+    """Return the arrows of the worst-case load, the largest force (N) and how many are drawn."""
+    sizes = np.linalg.norm(forces[:, :3], axis=1)
+    parts = drawing.assembly.parts
+    frames = [k for k in range(len(parts)) if not parts[k].fastener and sizes[k] > 0.0]
+    chosen = frames or [k for k in range(len(parts)) if sizes[k] > 0.0]
+    if not chosen:
+        return None, 0.0, 0
+    largest = float(sizes[chosen].max())
+    chosen = sorted((k for k in chosen if sizes[k] >= _FAINT * largest), key=lambda k: -sizes[k])
+    pieces = []
+    for k in chosen[:_ARROWS]:
+        vector = forces[k, :3] / largest * _ARROW_SHARE * drawing.diagonal
+        center = 0.5 * (points[k].min(axis=0) + points[k].max(axis=0))
+        pieces.append(arrow(center, vector, _ARROW_RADIUS * drawing.diagonal, LOAD_COLOR))
+    return merge(pieces, on_top=True), largest, len(pieces)
+
+
+def _spot_markers(report: RigidityReport, points: tuple[Array, ...]) -> tuple[Marker, ...]:
+    markers = []
+    for spot in report.weak_spots[:_SPOTS]:
+        fasteners = [k for k in spot.parts if report.assembly.parts[k].fastener]
+        k = (fasteners or list(spot.parts))[0]
+        middle = 0.5 * (points[k].min(axis=0) + points[k].max(axis=0))
+        markers.append(Marker(middle, str(spot.rank)))
+    return tuple(markers)
+
+
+def _title(report: RigidityReport) -> tuple[str, str]:
+    verdict = report.verdict.value.capitalize()
+    if report.verdict is not Verdict.RIGID and report.mobility.structural:
+        motions = count(report.mobility.structural, "motion")
+        verdict += f", {report.qualifier} {motions}" if report.qualifier else f", {motions}"
+    title = f"{report.assembly.name}: {verdict}"
+    if report.rigidity is not None:
+        title += f", {number(report.rigidity.value)} N/m"
+    said = [count(len(report.assembly.parts), "part"), f"{number(report.mass * 1e3)} g"]
+    if report.rigidity is not None:
+        if report.rigidity.measure == "mean_square":
+            millimetres = number(report.rigidity.compliance_mm_per_n)
+            said.append(f"softest way to push it: {millimetres} mm per newton")
+        if report.rigidity.frequency_hz is not None:
+            said.append(f"lowest natural frequency {number(report.rigidity.frequency_hz)} Hz")
+    return title, " · ".join(said)
+
+
+def _elastic_panel(
+    report: RigidityReport, drawing: Drawing, toward: Array
+) -> tuple[Panel, list[LegendItem]] | None:
+    load = unit_load(report)
+    if load is None:
+        return None
+    forces, twists = load
+    furthest = _furthest(report, drawing, twists)
+    if furthest == 0.0:
+        return None
+    scale = _nice(_DEFORMED_SHARE * drawing.diagonal / furthest)
+    moved = deformed_points(report, drawing, twists, scale)
+    body, edges = model_layers(drawing, moved)
+    arrows, largest, shown = _load_arrows(drawing, forces, moved)
+    surfaces = (body,) if arrows is None else (body, arrows)
+    extent = np.concatenate([*drawing.points, *(surface.points for surface in surfaces)])
+    panel = Panel(
+        f"How it gives way (deformation x {scale:g})",
+        surfaces,
+        (edges, outline(drawing, drawing.points)),
+        fit(extent, toward),
+        _spot_markers(report, moved),
+    )
+    legend = [
+        LegendItem("line", OUTLINE, "undeformed outline"),
+        LegendItem(
+            "none",
+            OUTLINE,
+            f"deformation drawn {scale:g} times as large as 1 N makes it "
+            f"(furthest point: {number(furthest / MM)} mm)",
+        ),
+    ]
+    if arrows is not None:
+        legend.append(
+            LegendItem(
+                "arrow",
+                LOAD_COLOR,
+                f"worst-case load of 1 N in all; longest arrow {number(largest)} N"
+                f" ({count(shown, 'part')} with the largest forces)",
+            )
+        )
+    for spot in report.weak_spots[:_SPOTS]:
+        what = spot_words(report.assembly, spot)
+        share = f"{100.0 * spot.energy_share:.0f} %"
+        legend.append(LegendItem(f"disc{spot.rank}", SPOT_COLOR, f"weak spot, {share}: {what}"))
+    return panel, legend
+
+
+def report_scene(report: RigidityReport) -> Scene:
+    """Return the picture of a report.
+
+    Parameters
+    ----------
+    report : RigidityReport
+        With at least one part.
+    """
+    drawing = drawing_of(report.assembly)
+    toward = view_direction(np.concatenate(drawing.points))
+    panels: list[Panel] = []
+    legend: list[LegendItem] = []
+    moving = motion_layers(report, drawing.points, drawing.solids, drawing.diagonal)
+    if moving is not None:
+        body, edges = model_layers(drawing, drawing.points, pale=0.25)
+        surfaces = (body, *moving.surfaces)
+        extent = np.concatenate([s.points for s in surfaces] + [moving.lines.points])
+        panels.append(Panel(moving.caption, surfaces, (edges, moving.lines), fit(extent, toward)))
+        legend += [LegendItem("arrow", MOTION_COLOR, text) for text in moving.legend]
+    elastic = _elastic_panel(report, drawing, toward)
+    if elastic is not None:
+        panels.append(elastic[0])
+        legend += elastic[1]
+    if not panels:
+        body, edges = model_layers(drawing, drawing.points)
+        panels.append(Panel("", (body,), (edges,), fit(body.points, toward)))
+    stand_ins = sum(solid.stand_in for solid in drawing.solids)
+    if stand_ins:
+        legend.append(
+            LegendItem(
+                "none", NEUTRAL, f"{count(stand_ins, 'part')} without a shape drawn as tubes"
+            )
+        )
+    title, subtitle = _title(report)
+    return Scene(title, subtitle, tuple(panels), tuple(legend))
+
+
+def part_scene(definition: PartDefinition) -> Scene:
+    """Return the picture of one part definition, with its ports named by kind."""
+    solid = solid_of()(definition)
+    color = np.array(color_rgb(71))
+    body = Surface(solid.points, solid.faces, np.tile(color, (len(solid.points), 1)))
+    edges = Lines(
+        solid.points,
+        solid.edges,
+        np.tile(np.array(_edge_color(color_rgb(71))), (len(solid.points), 1)),
+        width=1.5,
+    )
+    diagonal = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
+    ports = [
+        arrow(
+            port.position - 0.5 * port.length * port.axis,
+            1.25 * port.length * port.axis,
+            0.005 * diagonal,
+            MOTION_COLOR,
+        )
+        for port in definition.ports
+        if port.length > 0.0
+    ]
+    surfaces = (body, merge(ports, on_top=True)) if ports else (body,)
+    toward = view_direction(solid.points)
+    panel = Panel("", surfaces, (edges,), fit(np.concatenate([s.points for s in surfaces]), toward))
+    legend = [
+        LegendItem("arrow", MOTION_COLOR, f"{count(len(definition.ports), 'port')}, their axes")
+    ]
+    if solid.stand_in:
+        legend.append(LegendItem("none", NEUTRAL, "without a shape: drawn as tubes"))
+    mass = number(definition.mass_properties.mass * 1e3)
+    return Scene(
+        f"{definition.id} {definition.title}",
+        f"{definition.family} · {mass} g",
+        (panel,),
+        tuple(legend),
+        (1200, 900),
+    )
