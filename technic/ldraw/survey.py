@@ -230,7 +230,8 @@ class Surveyor:
         if not items:
             return
         lengths = np.linalg.norm(matrices, axis=1)
-        volume = np.abs(np.linalg.det(matrices / np.maximum(lengths, 1e-30)[:, None, :]))
+        unit = matrices / np.maximum(lengths, 1e-30)[:, None, :]
+        volume = np.abs((unit[:, :, 0] * np.cross(unit[:, :, 1], unit[:, :, 2])).sum(axis=1))
         singular = (volume < SINGULAR) | (lengths < SINGULAR).any(axis=1)
         for k in np.flatnonzero(singular):
             if items[k].kind is None:  # pieces of a hose are no bodies: their matrix is not used

@@ -49,7 +49,7 @@ def test_reference_keeps_numbers_name_and_text() -> None:
     assert line.number == 3
     assert line.color == 16
     assert line.position == (1.5, -2.0, 0.25)
-    assert line.matrix == (1, 0, 0, 0, -1, 0, 0, 0, 1)
+    assert list(line.matrix) == [1, 0, 0, 0, -1, 0, 0, 0, 1]
     assert line.name == "8002 -  main part.ldr"  # spaces inside are part of the name
 
 
