@@ -147,7 +147,16 @@ def _axle_features(line: Line) -> list[Feature]:
     for low, high in union(holes, JOIN):
         for a, b in divide(low, high):
             out.append(Feature(PortKind.AXLE_HOLE, line.at(a), line.at(b)))
+    # round stops and sleeves between cross-shaped stretches belong to one axle
+    for low, high in line.rounded(PieceKind.SHANK, 0.7) + line.rounded(PieceKind.COLLAR, 0.7):
+        before = any(a < low and abs(b - low) < AXLE_NOTCH for a, b in axles)
+        after = any(b > high and abs(a - high) < AXLE_NOTCH for a, b in axles)
+        if before and after:
+            axles.append((low, high))
     for low, high in union(axles, AXLE_NOTCH):
+        if high - low < JOIN:
+            # the end face of an axle drawn alone, at the bottom of a hole
+            continue
         out.append(Feature(PortKind.AXLE, line.at(low), line.at(high)))
         for a, b in line.rounded(PieceKind.COLLAR, 0.9):
             # a collar belongs to the axle it touches; a long one is a hub, not a stop

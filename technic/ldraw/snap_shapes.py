@@ -53,10 +53,13 @@ def _short_and_closed(snap: Snap, total: float) -> bool:
 def _female(snap: Snap, spans: list[_Span], total: float) -> list[tuple[PieceKind, float, float]]:
     if all(span[0] == "S" for span in spans):
         square = abs(spans[0][1] - PIN_RADIUS) < 0.6
-        return [(PieceKind.TUBE, spans[-1][3], spans[0][2])] if square else []
+        return [_tube(snap, spans[0][2], spans[-1][3])] if square else []
     if _is_pin(spans[0]) and _short_and_closed(snap, total):
-        return [(PieceKind.TUBE, spans[0][3], spans[0][2])]
+        return [_tube(snap, spans[0][2], spans[0][3])]
     out = []
+    if _is_pin(spans[0]) and abs(spans[0][3] - spans[0][2]) <= SHORT_SHAFT and not snap.slide:
+        # room for a stud in front of something narrower
+        out.append(_tube(snap, spans[0][2], spans[0][3]))
     for index, span in enumerate(spans):
         shape, _, start, end = span
         if shape == "A":
@@ -69,6 +72,11 @@ def _female(snap: Snap, spans: list[_Span], total: float) -> list[tuple[PieceKin
                 shared = index + 2 < len(spans) and _is_pin(spans[index + 2])
                 out.append(_mouth(spans, index + 1, end, shared))
     return out
+
+
+def _tube(snap: Snap, base: float, top: float) -> tuple[PieceKind, float, float]:
+    """Return a socket for a stud, pointing out of its open end."""
+    return (PieceKind.TUBE, base, top) if snap.closed == "a" else (PieceKind.TUBE, top, base)
 
 
 def _mouth(
@@ -101,6 +109,10 @@ def _male(snap: Snap, spans: list[_Span], total: float) -> list[tuple[PieceKind,
     ]
     # the latch of a pin is a flexible section; a shaft without one is no pin
     if not any(span[0] in ("_L", "L_") for span in spans):
+        if round_ and round_[-1] == len(spans) - 1:
+            _, _, start, end = spans[-1]
+            if abs(end - start) <= SHORT_SHAFT:
+                out.append((PieceKind.STUD, start, end))
         return out
     for index in round_:
         _, _, start, end = spans[index]
