@@ -7,6 +7,7 @@ beside the model are found too; nothing outside of the model's folder is ever op
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -34,6 +35,8 @@ __all__ = [
     "poses",
     "read",
 ]
+
+_OMR: Final = re.compile(r"^\d+(-\d+)? - (?=\S)")
 
 INHERIT: Final = 16
 """Colour code that means: the colour of the reference that leads here."""
@@ -101,6 +104,15 @@ class Placement:
     def lines(self) -> tuple[int, ...]:
         """Lines of the references that lead to the part, outermost first, its own line last."""
         return (*self.chain, self.line)
+
+    @property
+    def plain_number(self) -> str:
+        """The number without a set number before it.
+
+        The LDraw Official Model Repository embeds parts as ``<set> - <file>``: ``8002 - 33299a`` is
+        part 33299a. Other numbers are returned as they are.
+        """
+        return _OMR.sub("", self.number)
 
     @property
     def id(self) -> str:

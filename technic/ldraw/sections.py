@@ -22,6 +22,7 @@ from typing import Final
 from technic.errors import InputError
 from technic.ldraw.syntax import (
     MAX_BYTES,
+    PADDING,
     Drawing,
     Line,
     Meta,
@@ -156,7 +157,9 @@ def read(path: str | Path, *, skip_bad_lines: bool = False) -> Document:
     return document_from_text(decode(raw, path), path, sha256=digest, skip_bad_lines=skip_bad_lines)
 
 
-_HEADER: Final = re.compile(r"[ \t]*0[ \t]+(FILE|NOFILE|!DATA)(?:[ \t]+(.*))?")
+_HEADER: Final = re.compile(rf"[{PADDING}]*0[ \t]+(FILE|NOFILE|!DATA)(?:[ \t]+(.*))?")
+
+_STARTS: Final = "0" + PADDING
 
 
 def document_from_text(
@@ -167,7 +170,7 @@ def document_from_text(
     texts = split_lines(source.text)
     marks: list[tuple[int, str, str]] = []  # (index, keyword, name)
     for index, text in enumerate(texts):
-        if text[:1] in "0 \t" and (match := _HEADER.fullmatch(text)) is not None:
+        if text[:1] in _STARTS and (match := _HEADER.fullmatch(text)) is not None:
             marks.append((index, match[1], (match[2] or "").strip()))
     notices: list[Notice] = []
     sections: list[Section] = []

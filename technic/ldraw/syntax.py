@@ -22,6 +22,7 @@ from technic.errors import InputError
 __all__ = [
     "MAX_BYTES",
     "MAX_NUMBER",
+    "PADDING",
     "Blank",
     "Drawing",
     "Line",
@@ -44,6 +45,10 @@ MAX_BYTES: Final = 64 * 1024 * 1024
 MAX_NUMBER: Final = 1e7
 """Largest coordinate or matrix entry: 1e7 LDU are 4 km, no model. It also keeps products of nested
 matrices away from overflow."""
+
+PADDING: Final = " \t\f\x1a\ufeff"
+"""What may stand around a line: white space, the DOS end-of-file mark, and the byte order marks that
+are left inside when files are joined."""
 
 EXPORT_ADVICE: Final = (
     "Open the model in its editor and save or export it as LDraw (.ldr or .mpd), then try again."
@@ -286,7 +291,7 @@ def parse_line(text: str, number: int, path: Path) -> Line:
         With file and line: truncated reference, token that is no number, not finite or out of
         range, unknown line type.
     """
-    stripped = text.strip(" \t\f\x1a")
+    stripped = text.strip(PADDING)
     if not stripped:
         return Blank(number, text)
     kind = stripped[0]
@@ -359,6 +364,10 @@ def _reference_error(text: str, number: int, path: Path) -> InputError:
         value = float(token) if re.fullmatch(_NUMBER, token, re.ASCII) else None
         if value is not None and isfinite(value) and abs(value) <= MAX_NUMBER:
             continue
+        if token is tokens[-1] and not re.match(
+            r"[+-]?\.?\d+[.,\d]*$|[+-]?(nan|inf)", token, re.IGNORECASE
+        ):
+            break  # the file name, with numbers missing before it
         if value is not None:
             message = f"{field} = {_short(token)} is beyond {MAX_NUMBER:g} LDU (4 km)"
         elif re.fullmatch(r"[+-]?(nan|inf(inity)?)(\(.*\))?", token, re.IGNORECASE):

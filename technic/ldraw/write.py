@@ -19,7 +19,7 @@ from typing import Final
 from technic.errors import UsageError
 from technic.geometry import Pose
 from technic.ldraw.sections import Document
-from technic.ldraw.syntax import Meta, Text, normalise
+from technic.ldraw.syntax import PADDING, Meta, Text, normalise
 from technic.units import LDU
 
 __all__ = [
@@ -102,7 +102,7 @@ def append_parts(document: Document, parts: Sequence[NewPart]) -> Text:
         return source
     pieces = _LINE.findall(source.text)
     newline = _newline(pieces)
-    lines = [line for line in document.main.lines if line.text.strip() not in ("", "0", "\x1a")]
+    lines = [line for line in document.main.lines if line.text.strip(PADDING) not in ("", "0")]
     # Behind the last line that says anything; line numbers count from 1. A main model without any
     # line has its 0 FILE line at least.
     at = lines[-1].number if lines else min(document.main.start, len(pieces))

@@ -111,6 +111,25 @@ def test_the_same_submodel_twice_has_two_paths() -> None:
     assert len({p.id for p in found}) == 3
 
 
+def test_byte_order_marks_inside_joined_files() -> None:
+    found = parts("0 FILE m.ldr", ref("a.ldr"), "\ufeff0 FILE a.ldr", "\ufeff" + ref("3001.dat"))
+    assert [p.id for p in found] == ["m.ldr/a.ldr/4:3001"]
+
+
+@pytest.mark.parametrize(
+    ("name", "plain"),
+    [
+        ("8002 - 33299a.dat", "33299a"),
+        ("42020-1 - Sticker Left.dat", "sticker left"),
+        ("32524.dat", "32524"),
+        ("8002 - .dat", "8002 -"),
+        ("arm - 2.dat", "arm - 2"),
+    ],
+)
+def test_repository_names(name: str, plain: str) -> None:
+    assert parts(ref(name))[0].plain_number.strip() == plain
+
+
 def test_embedded_part_is_a_part() -> None:
     found = parts(
         "0 FILE m.ldr",
@@ -447,6 +466,7 @@ def test_deep_nesting_works_up_to_the_limit() -> None:
     assert len(part.lines) == 256
 
 
+@pytest.mark.slow
 def test_a_hundred_thousand_levels_are_refused() -> None:
     with pytest.raises(InputError, match="nested more than 256 deep") as caught:
         parts(*nested(100_000))
@@ -508,6 +528,59 @@ def test_a_bad_line_is_an_error_unless_skipped() -> None:
     assert len(found) == 1
     assert [n.lines for n in found.notices] == [(2,)]
     assert "left out" in found.notices[0].message
+
+
+SNIPPETS = st.sampled_from(
+    [
+        ref("3001.dat"),
+        ref("a.ldr"),
+        ref("b.ldr", matrix="2 0 0 0 1 0 0 0 1"),
+        ref("77.dat", matrix="1 0 0 0 0 0 0 0 1"),
+        "0 FILE a.ldr",
+        "0 FILE b.ldr",
+        "0 FILE",
+        "0 NOFILE",
+        "0 !DATA x",
+        "0 STEP",
+        "0 SYNTH",
+        "0 SYNTH BEGIN",
+        "0 SYNTH SYNTHESIZED",
+        "0 SYNTH END",
+        "0 MLCAD",
+        "0 MLCAD SKIP_BEGIN",
+        "0 MLCAD SKIP_END",
+        "0 BUFEXCHG A",
+        "0 BUFEXCHG A STORE",
+        "0 BUFEXCHG A RETRIEVE",
+        "0 !LDRAW_ORG",
+        "0 !LDRAW_ORG Part",
+        "0 !LDCAD CONTENT [type=path]",
+        "1 4 0 0",
+        "3 16",
+        "",
+    ]
+)
+
+
+@given(st.lists(SNIPPETS, max_size=14))
+def test_any_order_of_lines_is_read_or_refused(lines: list[str]) -> None:
+    """Every reference in use ends as a part or in a notice; every refusal has a remedy."""
+    try:
+        found = parts("0 title", *lines)
+    except InputError as error:
+        remedy = error.remedy
+        event = "refused"
+    else:
+        remedy = "none needed"
+        event = "read"
+        assert len({p.id for p in found}) == len(found)
+        listed = {line for p in found for line in p.lines}
+        listed |= {line for n in found.notices for line in n.lines}
+        used = {p.section.name for p in found} | {"m.mpd"}
+        for section in document("0 title", *lines).sections:
+            if section.name in used and section is section.scope[section.name.lower()]:
+                assert {r.number for r in section.references if r.name != "b.ldr"} <= listed
+    assert remedy, event
 
 
 # --- files beside the model -------------------------------------------------------------------
