@@ -32,7 +32,7 @@ class _Word:
 
 _WORDS = {
     "pin_hole": _Word(PortKind.PIN_HOLE, "hole", 20.0, divided=True),
-    "axle_hole": _Word(PortKind.AXLE_HOLE, "axle_hole", 20.0),
+    "axle_hole": _Word(PortKind.AXLE_HOLE, "axle_hole", 20.0, divided=True),
     "pin": _Word(PortKind.PIN, "pin", 20.0, divided=True),
     "friction_pin": _Word(PortKind.PIN, "pin", 20.0, friction=True, divided=True),
     "axle": _Word(PortKind.AXLE, "axle", 20.0),
