@@ -365,7 +365,7 @@ def _reference_error(text: str, number: int, path: Path) -> InputError:
         if value is not None and isfinite(value) and abs(value) <= MAX_NUMBER:
             continue
         if token is tokens[-1] and not re.match(
-            r"[+-]?\.?\d+[.,\d]*$|[+-]?(nan|inf)", token, re.IGNORECASE
+            r"[+-]?\.?\d[.,\d]*$|[+-]?(nan|inf)", token, re.IGNORECASE
         ):
             break  # the file name, with numbers missing before it
         if value is not None:

@@ -135,6 +135,7 @@ def test_unknown_line_type(text: str) -> None:
 def test_a_megabyte_of_digits_is_refused_at_once() -> None:
     error_of("1 16 " + "1" * 1_000_000)
     error_of("1 16 " + "1." * 500_000)
+    error_of("1 16 " + "1" * 1_000_000 + "x")
 
 
 def test_skipping_keeps_the_bad_line_and_its_reason() -> None:
