@@ -186,9 +186,10 @@ def _blocked(bores: Sequence[_Stretch], stops: Sequence[_Stretch]) -> bool:
     """Return whether some part around a bore has a stop above it."""
 
     def touches(lower: _Stretch, upper: _Stretch) -> bool:
-        # A collar may sit inside the counterbore of the hole that it stops at.
+        # A collar may sit inside the counterbore of the hole that it stops at, flush with its face.
         gap = upper.low - lower.high
-        return -COUNTERBORE - TOUCH <= gap <= TOUCH and upper.high > lower.high
+        above = upper.low + upper.high > lower.low + lower.high
+        return -COUNTERBORE - TOUCH <= gap <= TOUCH and above
 
     # Every member of a stack is a part around a bore of this shaft, so a stack that ends at a stop
     # has a member that touches it: one look at the neighbours covers stacks of any height.

@@ -113,6 +113,19 @@ def test_an_axle_with_a_stop_needs_a_bush_only_on_the_other_side():
     assert bores([*parts, place(bush(), [-6, 0, 0], ALONG)]) == [HELD]
 
 
+def test_a_collar_flush_with_the_face_of_its_hole_is_a_stop():
+    stopped = place(axle(4, stop=True), [0, 0, 0])
+    parts = [stopped, *frame(-30)]  # bore from -40 to -20, collar from -40 to -36
+    assert bores(parts) == [loose("both")]
+    thin = define(
+        "thin",
+        "Axle with a collar",
+        [port("axle", "axle", [0, 0, 0], X, 80), port("collar", "stop", [-39, 0, 0], X, 2)],
+        fastener=True,
+    )
+    assert bores([place(thin, [0, 0, 0]), *frame(-30)]) == [loose("+")]
+
+
 def test_the_pin_end_of_an_axle_pin_is_a_stop():
     parts = [place(axle_pin(), [0, 0, 0]), *frame(10, -10)]
     assert bores(parts) == [loose("-")]
