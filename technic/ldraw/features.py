@@ -180,13 +180,15 @@ def _pins(line: Line) -> list[Feature]:
         for piece, low, high, along in line.spans
         if piece.kind in (PieceKind.PIN, PieceKind.PIN_FRICTION)
     ]
+    round_ = line.rounded(PieceKind.SHANK, 0.5)
+    round_ += [
+        (low, high) for low, high in line.rounded(PieceKind.COLLAR, 0.5) if high - low <= MAX_COLLAR
+    ]
+    pins += _raw_pins(line, pins, round_)
     if not pins:
         return []
     ribs = [(low + high) / 2.0 for low, high in line.stretches(PieceKind.RIB)]
-    collars = line.rounded(PieceKind.COLLAR, 0.5)
-    solid = [(low, high) for low, high, _, _ in pins]
-    solid += line.rounded(PieceKind.SHANK, 0.5)
-    solid += [(low, high) for low, high in collars if high - low <= MAX_COLLAR]
+    solid = [(low, high) for low, high, _, _ in pins] + round_
     out = []
     for low, high in union(solid, JOIN):
         own = [pin for pin in pins if low - JOIN < pin[0] and pin[1] < high + JOIN]
@@ -218,6 +220,34 @@ def _pins(line: Line) -> list[Feature]:
     return out
 
 
+def _raw_pins(
+    line: Line, known: list[tuple[float, float, bool, bool]], round_: list[tuple[float, float]]
+) -> list[tuple[float, float, bool, bool]]:
+    """Return pins drawn without their primitive: a round shank of a pitch that ends in a lip."""
+    out = []
+    shanks = union(round_, JOIN)
+    for low, high in line.rounded(PieceKind.LATCH, 0.5):
+        for tip, inner, sign in ((high, low, 1.0), (low, high, -1.0)):
+            a, b = sorted((tip - sign * PITCH_LDU, inner))
+            taken = any(c - JOIN < tip < d + JOIN for c, d, _, _ in known)
+            if high - low <= MAX_LIP and not taken and covered(a, b, shanks) > SHANK_SHARE:
+                out.append(
+                    (
+                        min(tip, tip - sign * PITCH_LDU),
+                        max(tip, tip - sign * PITCH_LDU),
+                        sign > 0.0,
+                        False,
+                    )
+                )
+    return out
+
+
+MAX_LIP: Final = 2.6
+"""Longest lip at a pin's tip (LDU)."""
+
+SHANK_SHARE: Final = 0.7
+"""Least share of a pin's length that must be round shank (slits and collars take the rest)."""
+
 MAX_COLLAR: Final = 4.5
 """Longest collar within a pin (LDU): the two halves of the one in the middle."""
 
@@ -247,6 +277,24 @@ def _points(pieces: Iterable[Piece]) -> list[Feature]:
     return out
 
 
+def _sockets(line: Line) -> list[Feature]:
+    """Return the sockets of tow balls drawn as short round cups."""
+    rims = line.rounded(PieceKind.SOCKET_RIM, 0.5)
+    out = []
+    for low, high in union(line.rounded(PieceKind.SOCKET_WALL, 0.7), JOIN):
+        length = high - low
+        if CUP[0] <= length <= CUP[1] and covered(low, high, rims) > 0.7:
+            middle, half = (low + high) / 2.0, BALL_DIAMETER / 2.0
+            out.append(Feature(PortKind.SOCKET, line.at(middle - half), line.at(middle + half)))
+    return out
+
+
+CUP: Final = (9.0, 14.0)
+"""Depth of a tow ball's socket (LDU)."""
+
+BALL_DIAMETER: Final = 16.0
+
+
 def build_features(pieces: Iterable[Piece]) -> tuple[Feature, ...]:
     """Merge pieces into whole features.
 
@@ -273,7 +321,10 @@ def build_features(pieces: Iterable[Piece]) -> tuple[Feature, ...]:
             JOIN,
         )
         out += axial + _pins(line)
-        for low, high in _pin_holes(line):
+        holes = _pin_holes(line)
+        if not holes and not taken:
+            out += _sockets(line)
+        for low, high in holes:
             # the round outline of a cross-shaped hole is no pin hole
             if covered(low, high, taken) > 0.5:
                 continue

@@ -102,7 +102,13 @@ PIN_RADIUS: Final = 6.0
 BALL_RADII: Final = (8.0, 12.8)
 """Tow balls, and the balls of suspension parts (LDU)."""
 COLLAR_RADII: Final = (7.0, 9.5)
-RADIUS_SLACK: Final = 0.3
+LATCH_RADIUS: Final = 6.5
+"""The lip at a pin's tip (LDU)."""
+
+SOCKET_RADII: Final = (8.0, 10.0)
+"""Inside and outside of a tow ball's socket (LDU)."""
+
+RADIUS_SLACK: Final = 0.25
 
 MAX_DEPTH: Final = 64
 """Deepest nesting of subfiles; real parts reach 7."""
@@ -235,14 +241,25 @@ def _cylinders(group: Occurrence, share: float) -> list[Piece]:
     first, second = np.linalg.norm(x, axis=1), np.linalg.norm(z, axis=1)
     radii = (first + second) / 2.0
     round_ = (abs(first - second) <= RADIUS_SLACK) & (abs((x * z).sum(axis=1)) <= 1.0)
-    pin = round_ & (abs(radii - PIN_RADIUS) <= RADIUS_SLACK)
-    collar = round_ & (COLLAR_RADII[0] <= radii) & (radii <= COLLAR_RADII[1])
-    collar &= ~group.inverted
+    inside = group.inverted
+
+    def near(radius: float) -> NDArray[np.bool_]:
+        close: NDArray[np.bool_] = round_ & (abs(radii - radius) < RADIUS_SLACK)
+        return close
+
+    kinds = (
+        (K.WALL, near(PIN_RADIUS) & inside),
+        (K.SHANK, near(PIN_RADIUS) & ~inside),
+        (K.LATCH, near(LATCH_RADIUS) & ~inside),
+        (K.SOCKET_WALL, near(SOCKET_RADII[0]) & inside),
+        (K.SOCKET_RIM, near(SOCKET_RADII[1]) & ~inside),
+        (K.COLLAR, round_ & (COLLAR_RADII[0] <= radii) & (radii <= COLLAR_RADII[1]) & ~inside),
+    )
     out = []
-    for k in np.flatnonzero(pin | collar):
-        kind = K.COLLAR if collar[k] else K.WALL if group.inverted[k] else K.SHANK
-        start = group.offsets[k]
-        out.append(Piece(kind, start, start + axis[k], share, bool(group.inverted[k])))
+    for kind, chosen in kinds:
+        for k in np.flatnonzero(chosen):
+            start = group.offsets[k]
+            out.append(Piece(kind, start, start + axis[k], share, bool(inside[k])))
     return out
 
 
