@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from technic.errors import InputError
 from technic.ldraw.document import pose, poses
+from technic.units import LDU
 from tests.ldraw.documents import parts, ref
 
 
