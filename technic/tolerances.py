@@ -96,9 +96,9 @@ SAME_LINE: Final = 1.0 * LDU
 """Joints whose lines are this close share a line."""
 
 # --- numerics ---------------------------------------------------------------------------------
-EIGEN_RESIDUAL: Final = 1e-6
-"""Largest accepted relative residual |lambda G M x - x| of a reported eigenpair; ARPACK reaches 1e-9
-on well-conditioned models."""
+EIGEN_RESIDUAL: Final = 1e-4
+"""Largest accepted relative residual |lambda G M x - x| of a reported eigenpair. Rounding in springs a
+billion times stiffer than the mode (1e8 N/m against 0.2 N/m) makes 5e-6; a failed iteration makes 1."""
 
 CONSTRAINT_COMPLIANCE: Final = 1e-6
 """Compliance of a motion that is held rigidly, in units of the stiffest spring of the model: a

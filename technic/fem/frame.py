@@ -11,6 +11,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from technic.errors import InputError
 from technic.fem.element import Element
@@ -19,9 +20,10 @@ from technic.parts.definition import FrameBody, MassProperties, Material, Sectio
 
 __all__ = ["frame_element", "member_matrices"]
 
-SAME_NODE = 1e-7
-"""Attachments closer than this (m) along a member share a node: far below any real distance of two
-bores, far above rounding."""
+SAME_NODE = 0.1
+"""Attachments closer than this share of the section's size (root of its area) along a member share a
+node: beam theory says nothing about shorter distances, and elements that short drown the rest in
+rounding. The attachment keeps its place: a rigid arm leads to it."""
 
 
 def frame_element(body: FrameBody, properties: MassProperties, attachments: Array) -> Element:
@@ -86,41 +88,68 @@ def frame_element(body: FrameBody, properties: MassProperties, attachments: Arra
 def _subdivide(
     body: FrameBody, attachments: Array
 ) -> tuple[Array, list[tuple[int, int]], list[int], list[int]]:
-    """Place nodes: member ends, attachments projected on the nearest member, equal refinement."""
+    """Place nodes: member ends, attachments projected on the nearest member, equal refinement.
+
+    The result does not depend on the order of the attachments.
+    """
     starts = body.points[body.members[:, 0]]
     spans = body.points[body.members[:, 1]] - starts
     lengths = np.linalg.norm(spans, axis=1)
-    if not np.all(lengths > SAME_NODE):
+    if not np.all(lengths > 0.0):
         raise InputError(f"frame member {int(np.argmin(lengths))} has no length")
-    stations: list[dict[float, int]] = [{} for _ in lengths]
+    home, station = _project(starts, spans, lengths, attachments)
     nodes: list[Array] = [np.asarray(p) for p in body.points]
-    for m, (a, b) in enumerate(body.members):
-        stations[m] = {0.0: int(a), 1.0: int(b)}
-    node_of = []
-    for point in attachments:
-        t = np.clip(np.einsum("mi,mi->m", point - starts, spans) / lengths**2, 0.0, 1.0)
-        foot = starts + t[:, None] * spans
-        m = int(np.argmin(np.linalg.norm(point - foot, axis=1).round(12)))
-        near = [s for s in stations[m] if abs(s - t[m]) * lengths[m] < SAME_NODE]
-        if not near:
-            stations[m][float(t[m])] = len(nodes)
-            nodes.append(foot[m])
-            near = [float(t[m])]
-        node_of.append(stations[m][near[0]])
+    node_of = [0] * len(attachments)
     pairs: list[tuple[int, int]] = []
     member_of: list[int] = []
-    for m, station in enumerate(stations):
-        order = sorted(station)
-        for s, e in pairwise(order):
+    for m, (first, last) in enumerate(body.members):
+        close = SAME_NODE * np.sqrt(body.sections[m].area) / lengths[m]
+        chain = [(0.0, int(first))]
+        own = sorted((float(station[k]), k) for k in range(len(attachments)) if home[k] == m)
+        for group in _grouped(own, close):
+            t = float(np.mean([s for s, _ in group]))
+            if min(s for s, _ in group) <= close:
+                node = int(first)
+            elif max(s for s, _ in group) >= 1.0 - close:
+                node = int(last)
+            else:
+                node = len(nodes)
+                nodes.append(starts[m] + t * spans[m])
+                chain.append((t, node))
+            for _, k in group:
+                node_of[k] = node
+        chain.append((1.0, int(last)))
+        for (s, a), (e, b) in pairwise(chain):
             pieces = max(1, int(np.ceil((e - s) * lengths[m] / body.max_stretch - 1e-9)))
-            inner = []
-            for k in range(1, pieces):
-                inner.append(len(nodes))
-                nodes.append(starts[m] + (s + (e - s) * k / pieces) * spans[m])
-            chain = [station[s], *inner, station[e]]
-            pairs += pairwise(chain)
+            inner = list(range(len(nodes), len(nodes) + pieces - 1))
+            nodes += [starts[m] + (s + (e - s) * k / pieces) * spans[m] for k in range(1, pieces)]
+            pairs += pairwise([a, *inner, b])
             member_of += [m] * pieces
     return np.array(nodes), pairs, member_of, node_of
+
+
+def _project(
+    starts: Array, spans: Array, lengths: Array, points: Array
+) -> tuple[NDArray[np.int64], Array]:
+    """Return the member nearest to each point and where on it, between 0 and 1."""
+    if len(points) == 0:
+        return np.zeros(0, dtype=np.int64), np.zeros(0)
+    arms = points[:, None, :] - starts
+    t = np.clip(np.einsum("pmi,mi->pm", arms, spans) / lengths**2, 0.0, 1.0)
+    gaps = np.linalg.norm(arms - t[..., None] * spans, axis=2).round(12)
+    home = np.argmin(gaps, axis=1)
+    return home, t[np.arange(len(points)), home]
+
+
+def _grouped(stations: list[tuple[float, int]], close: float) -> list[list[tuple[float, int]]]:
+    """Divide sorted stations into groups that are not longer than `close`."""
+    groups: list[list[tuple[float, int]]] = []
+    for s, k in stations:
+        if groups and s - groups[-1][0][0] <= close:
+            groups[-1].append((s, k))
+        else:
+            groups.append([(s, k)])
+    return groups
 
 
 def member_matrices(

@@ -90,7 +90,7 @@ def analyze(
         system = assemble(assembly, element=FACTORIES[parts])
     with _timed(timings, "eigen"):
         found = [
-            _elastic(system, kin, body.motions, measure, modes if c == 0 else 1)
+            _elastic(system, kin, body.motions, measure, modes if c == 0 else 1, shown=c == 0)
             for c, body in enumerate(bodies)
         ]
     with _timed(timings, "weak_spots"):
@@ -156,12 +156,18 @@ def _body(kin: Kinematics, component: int) -> _Body:
 
 
 def _elastic(
-    system: System, kin: Kinematics, motions: ComponentMotions, measure: Measure, count: int
+    system: System,
+    kin: Kinematics,
+    motions: ComponentMotions,
+    measure: Measure,
+    count: int,
+    *,
+    shown: bool,
 ) -> tuple[Rigidity | None, tuple[Mode, ...]]:
     """Return the rigidity and the lowest modes of one component."""
     parts = list(motions.parts)
-    if len(parts) < 2 and not any(s.part == parts[0] for s in system.assembly.supports):
-        return None, ()
+    if len(parts) == 1 and not shown:
+        return None, ()  # a loose part: it says nothing about the model
     own = np.concatenate([np.arange(system.offsets[p], system.offsets[p + 1]) for p in parts])
     member = np.isin(kin.component_of, kin.component_of[parts[0]])
     rows = np.array([member[kin.owners[k][0]] for k in system.rows.link], dtype=bool)
@@ -182,10 +188,8 @@ def _elastic(
     value = float(pairs.values[0])
     frequency = float(np.sqrt(value / mass) / (2 * np.pi)) if measure == "mean_square" else None
     rigidity = Rigidity(value, frequency, measure, float(pairs.residuals[0]))
-    if count == 1:
-        return rigidity, ()
     out = []
-    for k in range(len(pairs.values)):
+    for k in range(len(pairs.values) if shown else 0):
         unknowns: Array = np.zeros(system.size)
         unknowns[own] = pairs.vectors[:, k]
         out.append(mode_of(system, float(pairs.values[k]), unknowns, measure))
