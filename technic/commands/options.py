@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -13,40 +12,24 @@ __all__ = [
     "AnalysisOptions",
     "AxleSlide",
     "AxleSlideOption",
-    "BodyKind",
-    "BodyKindOption",
     "FixOption",
     "JsonOption",
     "Measure",
     "MeasureOption",
     "MinRigidityOption",
     "ModesOption",
+    "PartModel",
+    "PartModelOption",
     "PictureOption",
     "QuietOption",
     "RequireRigidOption",
 ]
 
 
-class Measure(StrEnum):
-    """How displacement is measured."""
-
-    mean_square = "mean_square"
-    nodal = "nodal"
-
-
-class AxleSlide(StrEnum):
-    """Whether friction holds an axle in an axle hole."""
-
-    held = "held"
-    free = "free"
-
-
-class BodyKind(StrEnum):
-    """What a part is made of in the mechanics."""
-
-    frame = "frame"
-    rigid = "rigid"
-
+Measure = Literal["mean_square", "nodal"]
+AxleSlide = Literal["held", "free"]
+PartModel = Literal["frame", "rigid"]
+"""The values that `technic.rigidity.analyze.analyze` and the LDraw reader take."""
 
 JsonOption = Annotated[
     str | None,
@@ -77,8 +60,8 @@ AxleSlideOption = Annotated[
 ModesOption = Annotated[
     int, typer.Option("--modes", min=1, max=200, metavar="K", help="How many elastic modes.")
 ]
-BodyKindOption = Annotated[
-    BodyKind,
+PartModelOption = Annotated[
+    PartModel,
     typer.Option("--parts", help="frame: beams bend; rigid: only joints give way."),
 ]
 RequireRigidOption = Annotated[
@@ -103,10 +86,10 @@ class AnalysisOptions:
     json: str | None = None
     picture: Path | None = None
     fix: tuple[str, ...] = ()
-    measure: str = "mean_square"
-    axle_slide: str = "held"
+    measure: Measure = "mean_square"
+    axle_slide: AxleSlide = "held"
     modes: int = 6
-    parts: str = "frame"
+    parts: PartModel = "frame"
     require_rigid: bool = False
     min_rigidity: float | None = None
     quiet: bool = False

@@ -14,27 +14,50 @@ __all__ = ["fit", "view_direction"]
 _MARGIN = 1.06
 
 _ELEVATION = 30.0
-_FLAT_ELEVATION = 55.0
+_FLAT_ELEVATION = 50.0
 """Degrees above the horizon: a model that lies flat is seen from higher up."""
 
-_AZIMUTH = 35.0
-"""Degrees from the front towards the right side: not 45, where equal sides of a frame coincide."""
+_FLAT = 0.5
+
+_AZIMUTHS = (35.0, -35.0, 60.0, -60.0, 15.0)
+"""Degrees from the front towards the right side, the usual one first. Not 45, where equal sides of a
+frame coincide."""
+
+_USUAL = 0.85
+"""The usual view stays when it shows this share of what the best view shows of the movement."""
 
 
-def view_direction(points: Array) -> Array:
-    """Return the unit vector from a model, (n, 3) points, towards the eye: in front, right, above."""
-    size = np.ptp(points, axis=0)
-    flat = size[1] < 0.3 * min(size[0], size[2])
-    elevation = np.radians(_FLAT_ELEVATION if flat else _ELEVATION)
-    azimuth = np.radians(_AZIMUTH)
+def _direction(azimuth: float, elevation: float) -> Array:
     # LDraw: x right, y down, z away from the one who looks.
-    return np.array(
-        [
-            np.sin(azimuth) * np.cos(elevation),
-            -np.sin(elevation),
-            -np.cos(azimuth) * np.cos(elevation),
-        ]
-    )
+    a, e = np.radians(azimuth), np.radians(elevation)
+    return np.array([np.sin(a) * np.cos(e), -np.sin(e), -np.cos(a) * np.cos(e)])
+
+
+def view_direction(points: Array, movement: Array | None = None, aspect: float = 1.5) -> Array:
+    """Return the unit vector from a model towards the eye: in front, aside and above.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+        Of the model (m).
+    movement : (m, 3) ndarray, optional
+        Displacements that the picture is about: the view is one in which they are seen, not one
+        that looks along them.
+    aspect : float
+        Width over height of the picture: a view in which the model fills it shows more.
+    """
+    size = np.ptp(points, axis=0)
+    flat = size[1] < _FLAT * min(size[0], size[2])
+    elevation = _FLAT_ELEVATION if flat else _ELEVATION
+    views = [_direction(azimuth, elevation) for azimuth in _AZIMUTHS]
+    if movement is None:
+        return views[0]
+    shown = []
+    for view in views:
+        camera = fit(points, view)
+        across = np.linalg.norm(movement - np.outer(movement @ view, view), axis=1).sum()
+        shown.append(float(across) / max(camera.half_height, camera.half_width / aspect))
+    return views[0] if shown[0] >= _USUAL * max(shown) else views[int(np.argmax(shown))]
 
 
 def fit(points: Array, toward: Array) -> Camera:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pyvista
+import pyvista.plotting
 from numpy.typing import NDArray
 
 from technic.report.layout import Sheet
@@ -44,7 +45,7 @@ def _add_surface(plotter: pyvista.Plotter, surface: Surface) -> None:
         rgb=True,
         opacity=surface.opacity,
         smooth_shading=False,
-        ambient=0.5 if surface.on_top else 0.42,
+        ambient=0.5 if surface.on_top else 0.46,
         diffuse=0.7,
         specular=0.0 if surface.on_top else 0.08,
         reset_camera=False,
@@ -74,11 +75,23 @@ def _add_lines(plotter: pyvista.Plotter, lines: Lines) -> None:
     mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, -4.0)
 
 
+def _add_lights(plotter: pyvista.Plotter, panel: Panel) -> None:
+    """Light from the eye and from above on the left: white, so that colours stay what they are."""
+    right, up, toward = panel.camera.axes()
+    for direction, intensity in ((toward, 0.6), (1.2 * up - 0.8 * right + 0.4 * toward, 0.6)):
+        light = pyvista.Light(
+            position=tuple(direction), focal_point=(0.0, 0.0, 0.0), intensity=intensity
+        )
+        light.positional = False
+        plotter.add_light(light)
+
+
 def paint(panel: Panel, size: tuple[int, int]) -> tuple[NDArray[np.uint8], float]:
     """Return the picture of one panel, (height, width, 3), and its pixels per metre."""
-    plotter = pyvista.Plotter(off_screen=True, window_size=list(size), lighting="light kit")
+    plotter = pyvista.Plotter(off_screen=True, window_size=list(size), lighting="none")
     plotter.set_background("white")
-    plotter.enable_anti_aliasing("msaa", multi_samples=8)
+    _add_lights(plotter, panel)
+    plotter.enable_anti_aliasing(aa_type="msaa", multi_samples=4)
     for lines in panel.lines:
         _add_lines(plotter, lines)
     for surface in panel.surfaces:
@@ -94,7 +107,7 @@ def paint(panel: Panel, size: tuple[int, int]) -> tuple[NDArray[np.uint8], float
     camera.up = tuple(view.up)
     camera.parallel_scale = half
     plotter.reset_camera_clipping_range()
-    image = plotter.screenshot(return_img=True)
+    image = plotter.screenshot(None, return_img=True)
     plotter.close()
     return np.asarray(image)[:, :, :3], 0.5 * size[1] / half
 
@@ -111,11 +124,20 @@ def draw(scene: Scene) -> bytes:
     return stream.getvalue()
 
 
+def _warm_up() -> None:
+    """Open a tiny picture: what takes long the first time is done before the scene arrives."""
+    plotter = pyvista.Plotter(off_screen=True, window_size=[16, 16])
+    plotter.add_mesh(pyvista.PolyData(np.eye(3), _cells(np.array([[0, 1, 2]]))))
+    plotter.screenshot(None, return_img=True)
+    plotter.close()
+
+
 def main() -> None:
     """Read a scene, write a picture."""
     # Libraries that print must not spoil the picture: they get standard error.
     output = os.dup(1)
     os.dup2(2, 1)
+    _warm_up()
     scene = pickle.loads(sys.stdin.buffer.read())
     if not isinstance(scene, Scene):
         raise TypeError("standard input is not a scene")

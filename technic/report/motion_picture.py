@@ -25,7 +25,7 @@ _AMPLITUDE = 0.10
 _RADIUS = 0.0045
 _ARROWS_FIRST = 8
 _MOTIONS_SHOWN = 12
-_TURN = 1.2
+_TURN = 0.8
 """Turning arrows go this far round (rad)."""
 
 

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
+from technic.geometry import Array
 from technic.parts.definition import FrameBody, PartDefinition
 from technic.report.wording import count, number
 from technic.units import LDU, MM
@@ -59,7 +60,7 @@ def list_text(definitions: Sequence[PartDefinition]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _triple(values: Sequence[float]) -> str:
+def _triple(values: Array) -> str:
     return "(" + ", ".join(number(float(v) + 0.0, 4) for v in values) + ")"
 
 

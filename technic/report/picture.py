@@ -30,6 +30,7 @@ from technic.report.scene import (
 )
 from technic.report.solids import Solid, solid_of, world_points
 from technic.report.wording import count, number, spot_words
+from technic.report.worst_field import WorstField, worst_field
 from technic.rigidity.result import RigidityReport, Verdict
 from technic.rigidity.serialize import unit_load
 from technic.units import MM
@@ -46,10 +47,14 @@ _DEFORMED_SHARE = 0.07
 _ARROW_SHARE = 0.16
 _ARROW_RADIUS = 0.0045
 _ARROWS = 24
-_FAINT = 0.2
-"""Forces below this share of the largest are not drawn; the legend says so."""
+_APART = 0.04
+_FAINT = 0.25
+"""Loads below this share of the largest are not drawn."""
 
 _SPOTS = 3
+
+_WHOLE_ASPECT, _HALF_ASPECT = 1.9, 1.0
+"""Width over height, about, of a panel that is alone and of one of two."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +90,7 @@ def drawing_of(assembly: Assembly) -> Drawing:
 def _edge_color(color: RGB) -> RGB:
     """Return a colour for edges that shows on the part: dark on light parts, light on black ones."""
     brightness = 0.3 * color[0] + 0.6 * color[1] + 0.1 * color[2]
-    return (0.55, 0.58, 0.60) if brightness < 0.25 else (0.12, 0.13, 0.14)
+    return (0.55, 0.58, 0.60) if brightness < 0.18 else (0.12, 0.13, 0.14)
 
 
 def model_layers(
@@ -165,24 +170,50 @@ def _furthest(report: RigidityReport, drawing: Drawing, twists: Array) -> float:
     return best
 
 
+def _sample_pairs(report: RigidityReport, field: WorstField) -> list[tuple[int, int]]:
+    """Return (part, sample) pairs where arrows may stand: both ends of each part of structure."""
+    parts = report.assembly.parts
+    members = report.components[0].parts
+    frames = [k for k in members if not parts[k].fastener] or list(members)
+    chosen = []
+    for k in frames:
+        mine = np.flatnonzero(field.parts == k)
+        if not len(mine):
+            continue
+        where = field.points[mine]
+        _, _, vt = np.linalg.svd(where - where.mean(axis=0), full_matrices=False)
+        along = (where - where.mean(axis=0)) @ vt[0]
+        chosen += [(k, int(mine[i])) for i in sorted({int(along.argmin()), int(along.argmax())})]
+    return chosen
+
+
 def _load_arrows(
-    drawing: Drawing, forces: Array, points: tuple[Array, ...]
-) -> tuple[Surface | None, float, int]:
-    """Return the arrows of the worst-case load, the largest force (N) and how many are drawn."""
-    sizes = np.linalg.norm(forces[:, :3], axis=1)
-    parts = drawing.assembly.parts
-    frames = [k for k in range(len(parts)) if not parts[k].fastener and sizes[k] > 0.0]
-    chosen = frames or [k for k in range(len(parts)) if sizes[k] > 0.0]
-    if not chosen:
-        return None, 0.0, 0
-    largest = float(sizes[chosen].max())
-    chosen = sorted((k for k in chosen if sizes[k] >= _FAINT * largest), key=lambda k: -sizes[k])
-    pieces = []
-    for k in chosen[:_ARROWS]:
-        vector = forces[k, :3] / largest * _ARROW_SHARE * drawing.diagonal
-        center = 0.5 * (points[k].min(axis=0) + points[k].max(axis=0))
-        pieces.append(arrow(center, vector, _ARROW_RADIUS * drawing.diagonal, LOAD_COLOR))
-    return merge(pieces, on_top=True), largest, len(pieces)
+    report: RigidityReport, drawing: Drawing, field: WorstField, scale: float
+) -> tuple[Surface | None, float]:
+    """Return the arrows of the worst-case load and the largest load per mass (N/kg).
+
+    The load on material is in proportion to how far the material goes. Arrows end at the points that
+    they push, and stand on the deformed shape.
+    """
+    pairs = _sample_pairs(report, field)
+    sizes = {i: float(np.linalg.norm(field.displacements[i])) for _, i in pairs}
+    largest = max(sizes.values(), default=0.0)
+    if largest == 0.0:
+        return None, 0.0
+    order = sorted((i for i in sizes if sizes[i] >= _FAINT * largest), key=lambda i: (-sizes[i], i))
+    pieces: list[Surface] = []
+    starts: list[Array] = []
+    for i in order:
+        start = field.points[i] + scale * field.displacements[i]
+        vector = field.displacements[i] / largest * _ARROW_SHARE * drawing.diagonal
+        # Arrows closer than this run into each other; the larger one speaks for both.
+        if any(np.linalg.norm(start - other) < _APART * drawing.diagonal for other in starts):
+            continue
+        starts.append(start)
+        pieces.append(arrow(start, vector, _ARROW_RADIUS * drawing.diagonal, LOAD_COLOR))
+        if len(pieces) == _ARROWS:
+            break
+    return merge(pieces, on_top=True), largest * field.load_per_mass
 
 
 def _spot_markers(report: RigidityReport, points: tuple[Array, ...]) -> tuple[Marker, ...]:
@@ -214,19 +245,19 @@ def _title(report: RigidityReport) -> tuple[str, str]:
 
 
 def _elastic_panel(
-    report: RigidityReport, drawing: Drawing, toward: Array
+    report: RigidityReport, drawing: Drawing, field: WorstField, toward: Array
 ) -> tuple[Panel, list[LegendItem]] | None:
     load = unit_load(report)
     if load is None:
         return None
-    forces, twists = load
+    _, twists = load
     furthest = _furthest(report, drawing, twists)
     if furthest == 0.0:
         return None
     scale = _nice(_DEFORMED_SHARE * drawing.diagonal / furthest)
     moved = deformed_points(report, drawing, twists, scale)
     body, edges = model_layers(drawing, moved)
-    arrows, largest, shown = _load_arrows(drawing, forces, moved)
+    arrows, largest = _load_arrows(report, drawing, field, scale)
     surfaces = (body,) if arrows is None else (body, arrows)
     extent = np.concatenate([*drawing.points, *(surface.points for surface in surfaces)])
     panel = Panel(
@@ -250,8 +281,12 @@ def _elastic_panel(
             LegendItem(
                 "arrow",
                 LOAD_COLOR,
-                f"worst-case load of 1 N in all; longest arrow {number(largest)} N"
-                f" ({count(shown, 'part')} with the largest forces)",
+                "worst-case load: 1 N in all, spread over the material"
+                + (
+                    f"; longest arrow {number(largest * 1e-3)} N per gram"
+                    if report.rigidity is not None and report.rigidity.measure == "mean_square"
+                    else ""
+                ),
             )
         )
     for spot in report.weak_spots[:_SPOTS]:
@@ -270,17 +305,22 @@ def report_scene(report: RigidityReport) -> Scene:
         With at least one part.
     """
     drawing = drawing_of(report.assembly)
-    toward = view_direction(np.concatenate(drawing.points))
+    field = worst_field(report)
+    movement = None if field is None else field.displacements
+    moving = motion_layers(report, drawing.points, drawing.solids, drawing.diagonal)
+    side_by_side = moving is not None and field is not None
+    toward = view_direction(
+        np.concatenate(drawing.points), movement, _HALF_ASPECT if side_by_side else _WHOLE_ASPECT
+    )
     panels: list[Panel] = []
     legend: list[LegendItem] = []
-    moving = motion_layers(report, drawing.points, drawing.solids, drawing.diagonal)
     if moving is not None:
         body, edges = model_layers(drawing, drawing.points, pale=0.25)
         surfaces = (body, *moving.surfaces)
         extent = np.concatenate([s.points for s in surfaces] + [moving.lines.points])
         panels.append(Panel(moving.caption, surfaces, (edges, moving.lines), fit(extent, toward)))
         legend += [LegendItem("arrow", MOTION_COLOR, text) for text in moving.legend]
-    elastic = _elastic_panel(report, drawing, toward)
+    elastic = None if field is None else _elastic_panel(report, drawing, field, toward)
     if elastic is not None:
         panels.append(elastic[0])
         legend += elastic[1]

@@ -59,6 +59,23 @@ def sharp_edges(points: Array, faces: Faces) -> Faces:
     return np.concatenate([edges[paired[~flat]], edges[first[times == 1]]])
 
 
+def _struts(points: Array) -> list[Surface]:
+    """Return the shortest net of bars that joins all points (Prim's minimum spanning tree)."""
+    pieces: list[Surface] = []
+    nearest = np.zeros(len(points), dtype=np.int64)
+    distance = np.linalg.norm(points - points[0], axis=1)
+    distance[0] = np.inf
+    for _ in range(len(points) - 1):
+        k = int(np.argmin(distance))
+        if distance[k] > LDU:
+            pieces.append(tube(points[nearest[k]], points[k], _STRUT_RADIUS, NEUTRAL))
+        distance[k] = np.inf
+        away = np.linalg.norm(points - points[k], axis=1)
+        closer = (away < distance) & np.isfinite(distance)
+        distance[closer], nearest[closer] = away[closer], k
+    return pieces
+
+
 def _tubes(part: Part | PartDefinition) -> Surface:
     """Return tubes along the members of a frame body, or along the ports with struts between."""
     pieces: list[Surface] = []
@@ -67,12 +84,12 @@ def _tubes(part: Part | PartDefinition) -> Surface:
         for (a, b), section in zip(body.members, body.sections, strict=True):
             radius = float(np.sqrt(section.area / np.pi))
             pieces.append(tube(body.points[a], body.points[b], radius, NEUTRAL))
-    centroid = part.mass_properties.centroid
     for port in part.ports:
         half = 0.5 * max(port.length, _PORT_RADIUS) * port.axis
         pieces.append(tube(port.position - half, port.position + half, _PORT_RADIUS, NEUTRAL))
-        if not isinstance(body, FrameBody) and np.linalg.norm(port.position - centroid) > LDU:
-            pieces.append(tube(centroid, port.position, _STRUT_RADIUS, NEUTRAL))
+    if not isinstance(body, FrameBody) and part.ports:
+        pieces += _struts(np.array([port.position for port in part.ports]))
+    centroid = part.mass_properties.centroid
     if not pieces:
         half = np.array([0.0, _PORT_RADIUS, 0.0])
         pieces.append(tube(centroid - half, centroid + half, _PORT_RADIUS, NEUTRAL))

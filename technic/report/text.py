@@ -14,15 +14,15 @@ from technic.report.wording import (
     DIRECTION_WORDS,
     count,
     direction_of,
-    joined,
     number,
     part_name,
     part_names,
     place,
     spot_words,
 )
+from technic.report.worst_field import worst_field
 from technic.rigidity.result import Motion, MotionKind, RigidityReport, Verdict
-from technic.rigidity.serialize import joint_stiffness, size_mm, spot_place, unit_load
+from technic.rigidity.serialize import joint_stiffness, size_mm, spot_place
 from technic.units import MM
 
 __all__ = ["to_text"]
@@ -35,6 +35,8 @@ _FINDINGS_SHOWN = 3
 
 _PUSHED = 0.5
 """Parts that go at least this share of the furthest way are named in the softest direction."""
+
+_PUSHED_SHOWN = 2
 
 _VERDICTS = {
     Verdict.RIGID: ("good", "RIGID"),
@@ -79,6 +81,16 @@ def _headline(report: RigidityReport, style: Style) -> list[str]:
     return lines
 
 
+def _sizes(sizes: list[int]) -> str:
+    """Return how many parts some groups have, in words."""
+    if len(sizes) == 1:
+        return count(sizes[0], "part")
+    if max(sizes) == 1:
+        return "a single part each"
+    shown = ", ".join(str(n) for n in sizes[:6])
+    return f"{shown}{', ...' if len(sizes) > 6 else ''} parts"
+
+
 def _bodies(report: RigidityReport, style: Style) -> list[str]:
     lines: list[str] = []
     for c, component in enumerate(report.components[:1]):
@@ -90,8 +102,7 @@ def _bodies(report: RigidityReport, style: Style) -> list[str]:
         if others:
             said += (
                 f" {count(len(others), 'other group')} can move against it "
-                f"({joined([count(len(group), 'part') for group in others[:6]])}"
-                f"{', ...' if len(others) > 6 else ''})."
+                f"({_sizes([len(group) for group in others])})."
             )
         lines += style.wrap(said)
     rest = report.components[1:]
@@ -151,29 +162,37 @@ def _motions(report: RigidityReport, style: Style) -> list[str]:
 
 
 def _softest(report: RigidityReport, style: Style) -> list[str]:
-    load = unit_load(report)
-    if load is None:
+    field = worst_field(report)
+    if field is None:
         return []
-    _, twists = load
     assembly = report.assembly
-    members = report.components[0].parts
-    points = np.array([assembly.parts[k].centroid for k in members])
-    masses = np.array([assembly.parts[k].mass_properties.mass for k in members])
-    lines = ["", style("bold", "Softest direction")]
-    phrase = describe_field(points, twists[list(members), :3], masses)
+    lines = [
+        "",
+        style("bold", "Softest direction (where parts go, and where the worst load pushes)"),
+    ]
+    phrase = describe_field(field.points, field.displacements, field.weights)
     if phrase:
         lines += style.wrap(f"   {phrase[0].upper()}{phrase[1:]}.")
+    members = report.components[0].parts
     frames = [k for k in members if not assembly.parts[k].fastener] or list(members)
-    way = {k: float(np.linalg.norm(twists[k, :3])) for k in frames}
-    furthest = max(way.values())
+    way = {k: move for k in frames if (move := field.furthest(k)) is not None}
+    size = {k: float(np.linalg.norm(move)) for k, move in way.items()}
+    furthest = max(size.values(), default=0.0)
     sides: dict[tuple[int, int], list[int]] = {}
-    for k in sorted(frames, key=lambda k: (-way[k], k)):
-        if furthest > 0.0 and way[k] >= _PUSHED * furthest:
-            sides.setdefault(direction_of(twists[k, :3]), []).append(k)
+    for k in sorted(size, key=lambda k: (-round(size[k] / (furthest or 1.0), 6), k)):
+        if furthest > 0.0 and size[k] >= _PUSHED * furthest:
+            sides.setdefault(direction_of(way[k]), []).append(k)
     for side, parts in sides.items():
-        names = [f"{part_name(assembly.parts[k])} {number(way[k] / MM)} mm" for k in parts[:2]]
-        rest = f" and {len(parts) - 2} more" if len(parts) > 2 else ""
-        lines += style.wrap(", ".join(names) + rest, f"   {DIRECTION_WORDS[side]}: ", "        ")
+        names = [
+            f"{part_name(assembly.parts[k], line=True)} {number(size[k] / MM)} mm"
+            for k in parts[:_PUSHED_SHOWN]
+        ]
+        rest = len(parts) - _PUSHED_SHOWN
+        lines += style.wrap(
+            ", ".join(names) + (f" and {rest} more" if rest > 0 else ""),
+            f"   {DIRECTION_WORDS[side]}: ",
+            "        ",
+        )
     return lines
 
 

@@ -78,10 +78,13 @@ def joined(words: Sequence[str]) -> str:
     return ", ".join(words[:-1]) + " and " + words[-1]
 
 
-def part_name(part: Part) -> str:
-    """Return what a person calls a part: name, number, colour."""
+def part_name(part: Part, *, line: bool = False) -> str:
+    """Return what a person calls a part: name, number, colour, and its line in the file if asked."""
     color = color_name(part.color)
-    inner = ", ".join(word for word in (part.number, color) if word and word != part.name)
+    words = [word for word in (part.number, color) if word and word != part.name]
+    if line and part.source is not None:
+        words.append(f"line {part.source.line}")
+    inner = ", ".join(words)
     name = part.name or part.number or part.id
     return f"{name} ({inner})" if inner else name
 
