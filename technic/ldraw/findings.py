@@ -10,8 +10,6 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from technic.assembly.model import Finding, FindingKind, Joint
 from technic.geometry import Array
@@ -246,14 +244,11 @@ def _loose(
     bare: dict[tuple[int, int], Finding],
 ) -> Iterator[Finding]:
     """Return one finding for each group of parts that is not joined to the biggest one."""
-    number = len(placed.parts)
-    if not number:
+    if not placed.parts:
         return
-    ends = np.array([joint.parts for joint in joints], dtype=np.intp).reshape(-1, 2)
-    graph = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(number, number))
-    label = connected_components(graph, directed=False)[1].astype(np.intp)
+    label = _components(len(placed.parts), joints)
     sizes = np.bincount(label)
-    if len(sizes) == 1:
+    if sizes[0] == len(label):
         return
     # The biggest group is the model; the earliest one when several are equally big.
     main = label[int(np.argmax(sizes[label]))]
@@ -268,6 +263,22 @@ def _loose(
         why, distance = _why_loose(placed, members, reasons, bare, nearest.get(group))
         message = f"{who}: joined to nothing else; {why}"
         yield Finding(FindingKind.LOOSE, message, members, distance)
+
+
+def _components(number: int, joints: Sequence[Joint]) -> Indices:
+    """Return for each part the smallest index among the parts that it hangs together with."""
+    root = list(range(number))
+
+    def find(part: int) -> int:
+        while root[part] != part:
+            root[part] = root[root[part]]
+            part = root[part]
+        return part
+
+    for joint in joints:
+        a, b = sorted(find(part) for part in joint.parts)
+        root[b] = a
+    return np.array([find(part) for part in range(number)], dtype=np.intp)
 
 
 def _why_loose(

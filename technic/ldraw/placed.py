@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from technic.assembly.model import Part
 from technic.geometry import Array
@@ -142,11 +142,10 @@ def near_pairs(placed: PlacedPorts, first: Indices, second: Indices, reach: floa
         return np.empty((0, 2), dtype=np.intp)
     points_a, owner_a = _samples(placed, first)
     points_b, owner_b = _samples(placed, second)
-    tree_a, tree_b = cKDTree(points_a), cKDTree(points_b)
     # Every point of a port is within _SAMPLE / 2 of a sample, so two ports within reach have samples
     # within reach + _SAMPLE.
-    found = tree_a.sparse_distance_matrix(tree_b, reach + _SAMPLE, output_type="ndarray")
-    i, j = owner_a[found["i"]], owner_b[found["j"]]
+    near_a, near_b = _close(points_a, points_b, reach + _SAMPLE)
+    i, j = owner_a[near_a], owner_b[near_b]
     total = len(placed.part)
     codes = np.unique((i * total + j)[placed.part[i] != placed.part[j]])
     return np.column_stack([codes // total, codes % total])
@@ -159,6 +158,43 @@ def _samples(placed: PlacedPorts, chosen: Indices) -> tuple[Array, Indices]:
     rank = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
     along = ((rank + 0.5) / np.repeat(count, count) * 2.0 - 1.0) * np.repeat(half, count)
     return placed.position[owner] + along[:, None] * placed.axis[owner], owner
+
+
+def _close(first: Array, second: Array, reach: float) -> tuple[Indices, Indices]:
+    """Return all pairs of points at most `reach` (m) apart: indices into `first` and `second`.
+
+    A grid of cubes with side `reach` is the index: neighbours lie in the same cube or one of the 26
+    around it. (SciPy's tree does the same, but importing it costs more than the search.)
+    """
+    keys = _cells(second, reach)
+    code = _codes(keys)
+    order = np.argsort(code, kind="stable")
+    code = code[order]
+    own = _cells(first, reach)
+    pairs_a, pairs_b = [], []
+    for step in product((-1, 0, 1), repeat=3):
+        wanted = _codes(own + np.array(step))
+        start = np.searchsorted(code, wanted, side="left")
+        count = np.searchsorted(code, wanted, side="right") - start
+        a = np.repeat(np.arange(len(first)), count)
+        rank = np.arange(len(a)) - np.repeat(np.cumsum(count) - count, count)
+        b = order[np.repeat(start, count) + rank]
+        between = first[a] - second[b]
+        close = np.einsum("ij,ij->i", between, between) <= reach * reach
+        pairs_a.append(a[close])
+        pairs_b.append(b[close])
+    return np.concatenate(pairs_a), np.concatenate(pairs_b)
+
+
+def _cells(points: Array, side: float) -> NDArray[np.int64]:
+    return np.floor(points / side).astype(np.int64)
+
+
+def _codes(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return one number for each cube. Far cubes may share one: distances sort that out, and pairs
+    that are found twice are dropped.
+    """
+    return np.asarray(cells @ np.array([1, 1 << 21, 1 << 42], dtype=np.int64))
 
 
 def overlap(placed: PlacedPorts, pairs: Indices) -> Overlap:
