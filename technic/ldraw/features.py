@@ -65,6 +65,7 @@ def _pin_holes(line: Line) -> list[tuple[float, float]]:
         if piece.kind is PieceKind.MOUTH
     ]
     walls = line.rounded(PieceKind.WALL, 0.7)
+    mouths += _raw_mouths(line, walls)
     opening = [low for low, _, along in mouths if along] + [low for low, _ in whole]
     closing = [high for _, high, along in mouths if not along] + [high for _, high in whole]
     solid = whole + walls + [(low, high) for low, high, _ in mouths]
@@ -94,6 +95,19 @@ def _pin_holes(line: Line) -> list[tuple[float, float]]:
     return out
 
 
+def _raw_mouths(line: Line, walls: list[tuple[float, float]]) -> list[tuple[float, float, bool]]:
+    """Return counterbores drawn without their primitive: any arc of one in front of a bore."""
+    out = []
+    for low, high in line.rounded(PieceKind.SOCKET_WALL, 0.1):
+        if high - low > MAX_LIP:
+            continue
+        if any(abs(high - start) < JOIN for start, _ in walls):
+            out.append((low, high, True))
+        if any(abs(low - end) < JOIN for _, end in walls):
+            out.append((low, high, False))
+    return out
+
+
 def _nominal(low: float, high: float, opens: bool, closes: bool) -> tuple[float, float]:
     """Return a hole with one mouth in its nominal length, measured from that mouth.
 
@@ -115,8 +129,8 @@ NOMINAL_SLACK: Final = 2.5
 (LDU): the missing counterbore has 2."""
 
 MIN_RAW_BORE: Final = 6.0
-"""Shortest round bore without a hole primitive that counts as a pin hole: plates have 8 LDU, recesses
-for studs and collars 2 to 5."""
+"""Shortest round bore without a hole primitive that counts as a pin hole: some plates draw 6 of their
+8 LDU, recesses for studs and collars have 2 to 5."""
 
 
 def _axle_features(line: Line) -> list[Feature]:
@@ -243,7 +257,7 @@ def _raw_pins(
 
 
 MAX_LIP: Final = 2.6
-"""Longest lip at a pin's tip (LDU)."""
+"""Longest lip at a pin's tip, and deepest counterbore (LDU)."""
 
 SHANK_SHARE: Final = 0.7
 """Least share of a pin's length that must be round shank (slits and collars take the rest)."""

@@ -69,7 +69,7 @@ class PieceKind(StrEnum):
     COLLAR = "collar"
     """A cylinder wider than a bore seen from outside."""
     SOCKET_WALL = "socket_wall"
-    """A cylinder of a tow ball's radius seen from inside."""
+    """A cylinder of a counterbore's radius seen from inside, which is also a tow ball's."""
     SOCKET_RIM = "socket_rim"
     """The outside of a tow ball's socket."""
     STUD = "stud"
