@@ -25,6 +25,14 @@ __all__ = ["EigenPairs", "elastic_modes", "single_thread"]
 LOCAL = 100
 """A motion with at most this many unknowns is lifted rather than projected out."""
 
+SHIFT = 1e-8
+"""Shift in units of the stiffest spring: 1 N/m beside the axial 1e8 N/m of a pin, the order of a model's
+softest mode, and a hundred million times above rounding."""
+
+SHIFT_SHARE = 1e-3
+"""A mode this far below the shift would converge slowly: the shift is lowered and the step repeated. A
+motion costs nothing when its energy is this far below the shift."""
+
 Inverse = Callable[[Array], Array]
 
 DENSE = 400
@@ -153,58 +161,79 @@ def _sparse(
     motions: sparse.csc_array,
     count: int,
 ) -> tuple[Inverse, float, Array]:
-    """Shift and invert, with the motions lifted or projected out of every step.
+    """Shift and invert on the space that is M-orthogonal to the motions.
 
-    A motion w of few parts is lifted: ``k M w w^T M`` is as local as w and moves no elastic mode,
-    because those are M-orthogonal to w. Only motions of many parts are projected out.
+    A motion w of few parts that costs nothing is lifted: ``k M w w^T M`` is as local as w and moves no
+    elastic mode, because those are M-orthogonal to w. Motions of many parts, and motions that cost a
+    little because joints do not line up exactly, are held by Lagrange multipliers.
+
+    The shift decides how fast the iteration converges, not what it converges to; it is lowered once
+    when the softest mode turns out to be far below it.
     """
     n, c = stiffness.shape[0], constraints.shape[0]
-    lift, remaining = _lift(stiffness, measure, motions)
     count = min(count, n - motions.shape[1] - c - 1)
     if count <= 0:
         return (lambda load: load), 0.0, np.zeros((n, 0))
     biggest = float(abs(stiffness.diagonal()).max())
-    # Just above rounding in the stiffest spring: enough for a factor of a singular matrix, while the
-    # motions that it lifts are projected out of every answer.
-    shift = 1e-14 * biggest
-    matrix = sparse.csc_array(stiffness + lift + shift * measure)
-    solve = _factor(matrix, constraints, biggest)
-    projected = _orthonormal(measure, remaining)
-    weighted = measure @ projected
-
-    def apply(load: Array) -> Array:
-        load = np.ravel(load)
-        answer = solve(load - weighted @ (projected.T @ load))
-        answer -= projected @ (weighted.T @ answer)
-        return np.asarray(answer)
-
-    operator: Any = sparse_linalg.LinearOperator((n, n), matvec=apply, dtype=np.float64)
-    start = apply(measure @ np.cos(np.arange(n) * 1.2345 + 0.5))
-    try:
-        values, vectors = sparse_linalg.eigsh(
-            matrix, k=count, M=measure, sigma=0.0, OPinv=operator, v0=start, tol=1e-12
-        )
-    except sparse_linalg.ArpackError as error:
-        raise NumericalError(f"the eigen solver did not converge: {error}") from error
-    return apply, shift, vectors[:, np.argsort(values)]
+    shift = SHIFT * biggest
+    lift, held = _lift(stiffness, measure, motions, SHIFT_SHARE * shift)
+    border = measure @ held
+    for last in (False, True):
+        matrix = sparse.csc_array(stiffness + lift + shift * measure)
+        inverse = _bordered(_factor(matrix, constraints, biggest), border)
+        operator: Any = sparse_linalg.LinearOperator((n, n), matvec=inverse, dtype=np.float64)
+        start = inverse(measure @ np.cos(np.arange(n) * 1.2345 + 0.5))
+        try:
+            values, vectors = sparse_linalg.eigsh(
+                matrix, k=count, M=measure, sigma=0.0, OPinv=operator, v0=start, tol=1e-12
+            )
+        except sparse_linalg.ArpackError as error:
+            raise NumericalError(f"the eigen solver did not converge: {error}") from error
+        lowest = float(values.min()) - shift
+        if last or lowest > SHIFT_SHARE * shift:
+            break
+        shift = max(abs(lowest), SHIFT**2 * biggest)
+    return inverse, shift, vectors[:, np.argsort(values)]
 
 
 def _lift(
-    stiffness: sparse.csr_array, measure: sparse.csr_array, motions: sparse.csc_array
+    stiffness: sparse.csr_array, measure: sparse.csr_array, motions: sparse.csc_array, free: float
 ) -> tuple[sparse.csr_array, Array]:
-    """Return the stiffness that lifts local motions, and the others made M-orthogonal to them."""
-    local = np.diff(motions.indptr) <= LOCAL
+    """Return the stiffness that lifts local motions, and the other motions, M-orthonormal.
+
+    `free` is the energy per unit measure below which a motion costs nothing.
+    """
+    gram = np.asarray((motions.multiply(measure @ motions)).sum(axis=0)).ravel()
+    energy = np.asarray((motions.multiply(stiffness @ motions)).sum(axis=0)).ravel()
+    local = (np.diff(motions.indptr) <= LOCAL) & (energy <= free * gram)
     w = sparse.csc_array(motions[:, local])
-    wide = motions[:, ~local].toarray()
+    held = motions[:, ~local].toarray()
     if w.shape[1] == 0:
-        return sparse.csr_array(stiffness.shape), wide
+        return sparse.csr_array(stiffness.shape), _orthonormal(measure, held)
     weighted = sparse.csc_array(measure @ w)
-    gram = sparse.csc_array(w.T @ weighted)
-    if wide.shape[1]:
-        wide = wide - w @ sparse_linalg.splu(gram).solve(np.asarray(weighted.T @ wide))
+    products = sparse.csc_array(w.T @ weighted)
+    if held.shape[1]:
+        held = held - w @ sparse_linalg.splu(products).solve(np.asarray(weighted.T @ held))
     # as stiff as the material, so that lifted motions lie among the highest modes
-    size = float(np.median(stiffness.diagonal())) / gram.diagonal()
-    return sparse.csr_array(weighted @ sparse.diags_array(size) @ weighted.T), wide
+    size = float(np.median(stiffness.diagonal())) / gram[local]
+    lift = sparse.csr_array(weighted @ sparse.diags_array(size) @ weighted.T)
+    return lift, _orthonormal(measure, held)
+
+
+def _bordered(solve: Inverse, border: Array) -> Inverse:
+    """Return the inverse under the constraints ``border^T x = 0`` (Schur complement)."""
+    if border.shape[1] == 0:
+        return lambda load: solve(np.ravel(load))
+    carried = np.column_stack([solve(column) for column in border.T])
+    schur = linalg.cho_factor(border.T @ carried)
+
+    def inverse(load: Array) -> Array:
+        answer = solve(np.ravel(load))
+        answer = answer - carried @ linalg.cho_solve(schur, border.T @ answer)
+        # once more: the first pass leaves rounding of the size of what it took away
+        return np.asarray(answer - carried @ linalg.cho_solve(schur, border.T @ answer))
+
+    return inverse
 
 
 def _factor(matrix: sparse.csc_array, constraints: sparse.csr_array, biggest: float) -> Any:

@@ -64,7 +64,9 @@ def test_moving_and_renumbering_change_nothing(seed, parts):
         assert other.mobility.structural == reference.mobility.structural
         assert (other.rigidity is None) == (reference.rigidity is None)
         if reference.rigidity is not None:
-            assert other.rigidity.value == pytest.approx(reference.rigidity.value, rel=1e-6)
+            assert other.rigidity.value == pytest.approx(
+                reference.rigidity.value, rel=1e-4
+            )  # springs a billion times stiffer than the softest mode leave six digits of it
 
 
 @settings(max_examples=15)
