@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from technic.assembly.model import Part
+from technic.errors import InputError
 from technic.geometry import Array
 from technic.parts.definition import PortKind
 from technic.units import PITCH
@@ -25,6 +26,10 @@ Indices = NDArray[np.intp]
 
 _SAMPLE: Final = PITCH
 """Spacing of the points by which a port is found in the index."""
+
+_MOST_PAIRS: Final = 20_000_000
+"""Most pairs of points in neighbouring cubes; 2,526 parts of a real model have 40 thousand. Far above
+it (thousands of copies in one place) the memory would not do."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -176,6 +181,11 @@ def _close(first: Array, second: Array, reach: float) -> tuple[Indices, Indices]
         wanted = _codes(own + np.array(step))
         start = np.searchsorted(code, wanted, side="left")
         count = np.searchsorted(code, wanted, side="right") - start
+        if count.sum() > _MOST_PAIRS:
+            raise InputError(
+                "too many parts in one place: their connections cannot be told apart",
+                remedy="Remove the copies that lie in each other.",
+            )
         a = np.repeat(np.arange(len(first)), count)
         rank = np.arange(len(a)) - np.repeat(np.cumsum(count) - count, count)
         b = order[np.repeat(start, count) + rank]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from technic.assembly.model import Assembly, Finding, FindingKind, Part, Source, UnknownPart
 from technic.assembly.stiffness import StiffnessTable, default_table
-from technic.errors import InputError
+from technic.errors import InputError, UsageError
 from technic.geometry import Pose
 from technic.ldraw.connect import AxleSlide, connect
 from technic.ldraw.document import Document, Placement, placements, poses, read
@@ -112,6 +112,8 @@ def load_ldraw(
 def lookup(library: Library | None = None, shadow: ShadowLibrary | None = None) -> Lookup:
     """Return the function that finds a part: in the catalogue, else in the library when given."""
     shipped = catalogue()
+    if library is None and shadow is not None:
+        raise UsageError("the shadow library adds to an LDraw library: give that too")
     if library is None:
         return shipped.resolve
     from technic.ldraw.imported import definition_from_library

@@ -9,9 +9,10 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from technic.assembly.joint_types import JointType
 from technic.assembly.model import FindingKind
 from technic.assembly.stiffness import default_table
-from technic.errors import InputError
+from technic.errors import InputError, UsageError
 from technic.geometry import Pose
 from technic.ldraw.connect import connect
 from technic.ldraw.document import read
@@ -194,3 +195,29 @@ def test_no_known_part_is_an_error(write):
 def test_no_part_at_all_is_an_error(write):
     with pytest.raises(InputError, match="no parts"):
         load_ldraw(write("0 title\n"))
+
+
+def test_a_library_supplies_what_the_catalogue_lacks(write, ldraw_library):
+    from technic.ldraw.library import Library
+    from technic.parts.catalogue import catalogue
+
+    library = Library.open(ldraw_library)
+    number = next(n for n in sorted(library.part_numbers()) if n not in catalogue())
+    path = write(line("32316.dat") + line(f"{number}.dat"))
+    alone = load_ldraw(path)
+    assert [part.number for part in alone.unknown] == [number]
+    helped = load_ldraw(path, library=library)
+    assert not helped.unknown
+    assert [part.number for part in helped.parts] == ["32316", number]
+
+
+def test_a_shadow_library_alone_is_a_mistake(model):
+    with pytest.raises(UsageError, match="shadow"):
+        load_ldraw(model("square.ldr"), shadow=object())
+
+
+def test_axles_may_slide(model):
+    path = model("omr_42004_mini_backhoe.mpd")
+    types = {joint.type for joint in load_ldraw(path, axle_slide="free").joints}
+    assert JointType.SLIDER in types
+    assert JointType.SLIDER not in {joint.type for joint in load_ldraw(path).joints}
