@@ -17,11 +17,12 @@ from scipy import sparse
 from technic.assembly.model import Assembly, Part
 from technic.fem.build import build_element
 from technic.fem.element import Element
-from technic.geometry import Array, turn_twist
+from technic.geometry import Array, shift_twist, turn_twist
 from technic.parts.definition import Body, MassProperties, RigidBody
+from technic.system.plane import check_plane, in_plane
 from technic.system.rows import HeldRows, held_rows, transfer
 
-__all__ = ["ElementFactory", "System", "assemble", "element_of"]
+__all__ = ["ElementFactory", "Probe", "System", "assemble", "element_of", "rigid_element_of"]
 
 ElementFactory = Callable[[Part, Array, tuple[str | None, ...]], Element]
 """From a part, its attachment points (part coordinates) and their port names, to its element."""
@@ -48,6 +49,8 @@ class System:
         Consistent mass (kg and consistent).
     R : (n, 6 p) sparse
         Rigid motions: unknowns when each part moves by a twist about its centroid, world axes.
+    probes : (6 q, n) sparse
+        Twist of each probed point, world axes.
     """
 
     assembly: Assembly
@@ -58,6 +61,7 @@ class System:
     rows: HeldRows
     mass_matrix: sparse.csr_array
     R: sparse.csr_array
+    probes: sparse.csr_array
 
     @property
     def size(self) -> int:
@@ -101,7 +105,7 @@ class System:
 
 
 def element_of(part: Part, points: Array, _ports: tuple[str | None, ...]) -> Element:
-    """Return the element of a part's own body (frame members or a rigid body)."""
+    """Return the element of a part's own body (frame members, a mesh, a rigid body...)."""
     return build_element(part.body, part.mass_properties, points)
 
 
@@ -110,7 +114,27 @@ def rigid_element_of(part: Part, points: Array, _ports: tuple[str | None, ...]) 
     return build_element(RigidBody(), part.mass_properties, points)
 
 
-def assemble(assembly: Assembly, *, element: ElementFactory = element_of) -> System:
+@dataclass(frozen=True, slots=True, eq=False)
+class Probe:
+    """A point of a part where a load acts or a displacement is asked for.
+
+    Parameters
+    ----------
+    part : int
+    point : (3,) array_like
+        World coordinates (m).
+    port : str or None
+        The port it belongs to.
+    """
+
+    part: int
+    point: Array
+    port: str | None = None
+
+
+def assemble(
+    assembly: Assembly, *, element: ElementFactory = element_of, probes: tuple[Probe, ...] = ()
+) -> System:
     """Return the matrices of an assembly.
 
     Parameters
@@ -118,11 +142,21 @@ def assemble(assembly: Assembly, *, element: ElementFactory = element_of) -> Sys
     assembly : Assembly
     element : callable
         What a part becomes: `element_of`, `rigid_element_of`, or one that looks up solid models.
+    probes : tuple of Probe
+        Points whose twist is wanted beside the joints'.
+
+    Raises
+    ------
+    InputError
+        A part cannot be meshed, or a part of a two-dimensional assembly leaves the plane z = 0.
     """
-    elements, frames, origins = _elements(assembly, element)
+    if assembly.dimension == 2:
+        check_plane(assembly)
+    elements, frames, origins = _elements(assembly, element, probes)
+    links = len(assembly.joints) + len(assembly.supports)
     offsets = np.concatenate([[0], np.cumsum([e.size for e in elements])]).astype(np.int64)
     rows = held_rows(assembly)
-    side_a, side_b = transfer(assembly, origins, world=False)
+    side_a, side_b = transfer(assembly, origins[:links], world=False)
     n = int(offsets[-1])
     a = _joint_matrix(assembly, rows, (side_a, side_b), frames, offsets, n)
     if assembly.parts:
@@ -139,11 +173,29 @@ def assemble(assembly: Assembly, *, element: ElementFactory = element_of) -> Sys
         rows=rows,
         mass_matrix=_block_diagonal([e.mass for e in elements]),
         R=_block_diagonal(rigid),
+        probes=_probe_matrix(assembly, probes, frames[links:], origins[links:, 0], offsets, n),
     )
 
 
+def _probe_matrix(
+    assembly: Assembly,
+    probes: tuple[Probe, ...],
+    frames: list[tuple[Array | None, Array | None]],
+    origins: Array,
+    offsets: NDArray[np.int64],
+    n: int,
+) -> sparse.csr_array:
+    """Return the twist of every probe in world axes."""
+    out = sparse.lil_array((6 * len(probes), n))
+    for k, (probe, (frame, _), origin) in enumerate(zip(probes, frames, origins, strict=True)):
+        turn = turn_twist(assembly.parts[probe.part].pose.rotation)
+        own = slice(int(offsets[probe.part]), int(offsets[probe.part + 1]))
+        out[6 * k : 6 * k + 6, own] = shift_twist(np.asarray(probe.point) - origin) @ turn @ frame
+    return sparse.csr_array(out)
+
+
 def _elements(
-    assembly: Assembly, element: ElementFactory
+    assembly: Assembly, element: ElementFactory, probes: tuple[Probe, ...]
 ) -> tuple[tuple[Element, ...], list[tuple[Array | None, Array | None]], Array]:
     """Build each part's element once per kind, and pick both frames of every joint and support."""
     links: list[tuple[Array, tuple[int, ...], tuple[str | None, ...]]] = []
@@ -152,6 +204,7 @@ def _elements(
     for support in assembly.supports:
         point = assembly.parts[support.part].centroid if support.point is None else support.point
         links.append((point, (support.part,), (None,)))
+    links += [(probe.point, (probe.part,), (probe.port,)) for probe in probes]
     attached: list[list[tuple[Array, str | None]]] = [[] for _ in assembly.parts]
     place: list[list[tuple[int, int]]] = []
     for point, parts, ports in links:
@@ -169,7 +222,8 @@ def _elements(
         names = tuple(port for _, port in items)
         key = (_identity(part.body, part.mass_properties, part.number), names, points.tobytes())
         if key not in cache:
-            cache[key] = element(part, points, names)
+            made = element(part, points, names)
+            cache[key] = in_plane(made) if assembly.dimension == 2 else made
         elements.append(cache[key])
     frames: list[tuple[Array | None, Array | None]] = []
     origins = np.zeros((len(links), 2, 3))

@@ -1,0 +1,1 @@
+"""Static answers: how far a model gives way under loads."""
