@@ -13,7 +13,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from technic.assembly.joint_types import JointType
+from technic.assembly.joint_types import HELD, JointType
 from technic.assembly.model import Finding, Joint, Part
 from technic.assembly.stiffness import ConnectionStiffness, StiffnessTable
 from technic.errors import UsageError
@@ -183,6 +183,9 @@ def _build(
     point: Array | None = None,
 ) -> Joint:
     held = entry.held(type_)
+    if mating.connection == "pin/pin_hole" and not placed.port(mating.male).friction:
+        # A spin stiffness in the table is the friction of ridged pins; smooth ones turn freely.
+        held = readonly(HELD[type_], dtype=bool)
     if np.any(np.asarray(stiffness)[held] <= 0.0):
         raise UsageError(
             f"the stiffness table gives no value for a held motion of {entry.connection!r} "

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from technic.assembly.model import Part
 from technic.errors import InputError
 from technic.geometry import Array
-from technic.parts.definition import PortKind
+from technic.parts.definition import Port, PortKind
 from technic.units import PITCH
 
 __all__ = ["Indices", "Overlap", "PlacedPorts", "collect", "near_pairs", "on_line", "overlap"]
@@ -60,10 +60,14 @@ class PlacedPorts:
     axis: Array
     half: Array
 
+    def port(self, index: int) -> Port:
+        """Return a port as the part has it."""
+        part = int(self.part[index])
+        return self.parts[part].ports[index - int(self.start[part])]
+
     def name(self, index: int) -> str:
         """Return the name of a port."""
-        part = int(self.part[index])
-        return self.parts[part].ports[index - int(self.start[part])].name
+        return self.port(index).name
 
     def of_part(self, part: int) -> range:
         """Return the ports of a part."""

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from technic.assembly.joint_types import JointType
 from technic.assembly.model import FindingKind, Part
-from technic.assembly.stiffness import default_table
+from technic.assembly.stiffness import default_table, read_table
 from technic.errors import UsageError
 from technic.geometry import Pose
 from technic.ldraw.connect import connect
@@ -179,6 +179,30 @@ def test_axle_in_axle_hole_is_fixed_or_slides():
     assert joint.type is JointType.SLIDER
     np.testing.assert_array_equal(joint.held, [0, 1, 1, 1, 1, 1])
     assert joint.stiffness[0] == 0.0
+
+
+def test_friction_in_the_table_holds_ridged_pins_only(tmp_path):
+    path = tmp_path / "friction.toml"
+    path.write_text(
+        """
+schema = "technic-stiffness/1"
+[connection."pin/pin_hole"]
+type = "hinge"
+axial = { value = 1e8, provenance = "paper" }
+shear = { value = 65625, provenance = "paper" }
+tilt = { value = 0.24, provenance = "paper" }
+spin = { value = 0.01, provenance = "assumed" }
+""",
+        encoding="utf-8",
+    )
+    smooth = define("smooth", "Smooth pin", [port("end", "pin", [0, 0, 0], Y, 20)], fastener=True)
+    for kind, held in (
+        (place(pin(1), [0, 0, 0], turn("x", "y")), True),
+        (place(smooth, [0, 0, 0]), False),
+    ):
+        (joint,), _ = connect([place(beam(1), [0, 0, 0]), kind], read_table(path))
+        assert bool(joint.held[3]) == held
+        assert joint.stiffness[3] == (0.01 if held else 0.0)
 
 
 def test_unknown_axle_slide_is_refused():
