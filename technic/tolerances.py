@@ -101,9 +101,9 @@ EIGEN_RESIDUAL: Final = 1e-3
 digits. Rounding in springs a billion times stiffer than the mode makes 1e-5 to 1e-4 (steel beams on soft
 joints), on LEGO models 1e-8; a failed iteration makes 1."""
 
-CONSTRAINT_COMPLIANCE: Final = 1e-6
-"""Compliance of a motion that is held rigidly, in units of the stiffest spring of the model: a
-millionth of the smallest compliance there is, and enough to settle redundant constraints."""
+CONSTRAINT_COMPLIANCE: Final = 1e-9
+"""Compliance of a motion that is held rigidly, in units of the compliance of the model's stiffest spring:
+nothing that shows in a report, and a million times above rounding, which settles redundant constraints."""
 
 DRIVEN_MOTION: Final = 1e-6
 """Loads drive a motion when their work on it exceeds this share of what they could do: rounding makes

@@ -155,9 +155,9 @@ def _motions(system: System) -> sparse.csc_array:
 def _refuse_driven(motions: sparse.csc_array, force: Array) -> None:
     if motions.shape[1] == 0:
         return
-    size = abs(motions).T @ np.abs(force)
+    furthest = np.asarray(abs(motions).max(axis=0).toarray()).ravel()
     work = np.abs(motions.T @ force)
-    if np.any(work > DRIVEN_MOTION * max(float(size.max()), 1e-300)):
+    if np.any(work > DRIVEN_MOTION * furthest * float(np.abs(force).sum())):
         raise UsageError(
             "the loads drive a motion that nothing resists, so there is no static answer; "
             "hold the model (--fix PART) or look at what moves with `technic analyze`"

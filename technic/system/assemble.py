@@ -190,6 +190,7 @@ def _probe_matrix(
     for k, (probe, (frame, _), origin) in enumerate(zip(probes, frames, origins, strict=True)):
         turn = turn_twist(assembly.parts[probe.part].pose.rotation)
         own = slice(int(offsets[probe.part]), int(offsets[probe.part + 1]))
+        assert frame is not None  # every probe has one
         out[6 * k : 6 * k + 6, own] = shift_twist(np.asarray(probe.point) - origin) @ turn @ frame
     return sparse.csr_array(out)
 
