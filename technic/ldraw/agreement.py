@@ -14,11 +14,12 @@ from technic.units import LDU
 
 __all__ = ["Cause", "Difference", "differences"]
 
-POSITION: Final = 1.0 * LDU
-"""Two ports are at one place when their middles are closer than this."""
+POSITION: Final = 1.05 * LDU
+"""Two ports are at one place when their middles are closer than this: whether a counterbore (2 LDU)
+at one end is counted moves the middle by 1 LDU."""
 
 LENGTH: Final = 2.1 * LDU
-"""And as long when they differ by less than this: whether one counterbore is counted."""
+"""And as long when they differ by less than this, for the same reason."""
 
 COMPARED: Final = frozenset(
     {

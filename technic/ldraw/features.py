@@ -65,7 +65,8 @@ def _pin_holes(line: Line) -> list[tuple[float, float]]:
         if piece.kind is PieceKind.MOUTH
     ]
     walls = line.rounded(PieceKind.WALL, 0.7)
-    mouths += _raw_mouths(line, walls)
+    drawn = _raw_mouths(line, walls)
+    mouths += drawn
     opening = [low for low, _, along in mouths if along] + [low for low, _ in whole]
     closing = [high for _, high, along in mouths if not along] + [high for _, high in whole]
     solid = whole + walls + [(low, high) for low, high, _ in mouths]
@@ -89,7 +90,8 @@ def _pin_holes(line: Line) -> list[tuple[float, float]]:
             opens = any(abs(s - a) < JOIN for s in opening)
             closes = any(abs(s - b) < JOIN for s in closing)
             if opens or closes:
-                out.append(_nominal(a, b, opens, closes))
+                raw = any(abs(low - a) < JOIN or abs(high - b) < JOIN for low, high, _ in drawn)
+                out.append(_nominal(a, b, opens, closes, half=not raw))
             elif b - a >= MIN_RAW_BORE and covered(a, b, walls) > 0.0:
                 out.append((a, b))
     return out
@@ -108,19 +110,19 @@ def _raw_mouths(line: Line, walls: list[tuple[float, float]]) -> list[tuple[floa
     return out
 
 
-def _nominal(low: float, high: float, opens: bool, closes: bool) -> tuple[float, float]:
+def _nominal(low: float, high: float, opens: bool, closes: bool, half: bool) -> tuple[float, float]:
     """Return a hole with one mouth in its nominal length, measured from that mouth.
 
     Behind its wall such a hole opens into a recess of any depth, or ends blind; what a pin fills is
-    half a pitch or whole ones.
+    half a pitch (when `half`: a plate has only 8 of those 10 LDU) or whole ones.
     """
     if opens and closes:
         return low, high
     length = high - low
-    half = PITCH_LDU / 2.0
-    steps = max(1, round(length / half))
-    if abs(length - steps * half) <= NOMINAL_SLACK and (steps == 1 or steps % 2 == 0):
-        length = steps * half
+    step = PITCH_LDU / 2.0
+    steps = max(1, round(length / step))
+    if abs(length - steps * step) <= NOMINAL_SLACK and (steps % 2 == 0 or (steps == 1 and half)):
+        length = steps * step
     return (low, low + length) if opens else (high - length, high)
 
 
@@ -128,7 +130,7 @@ NOMINAL_SLACK: Final = 2.5
 """A hole with one mouth is taken for a nominal one when its wall is at most this much shorter or longer
 (LDU): the missing counterbore has 2."""
 
-MIN_RAW_BORE: Final = 6.0
+MIN_RAW_BORE: Final = 7.8
 """Shortest round bore without a hole primitive that counts as a pin hole: some plates draw 6 of their
 8 LDU, recesses for studs and collars have 2 to 5."""
 
@@ -156,6 +158,13 @@ def _axle_features(line: Line) -> list[Feature]:
         elif near_axle:
             axles.append((low, high))
         elif inward:
+            holes.append((low, high))
+    # a round rim in front of the cross belongs to the hole
+    rims = line.stretches(PieceKind.WALL, PieceKind.SOCKET_WALL, PieceKind.MOUTH)
+    rims = [(low, high) for low, high in rims if high - low <= MAX_LIP]
+    holes = union(holes, JOIN)
+    for low, high in rims:
+        if any(abs(low - b) < JOIN or abs(high - a) < JOIN for a, b in holes):
             holes.append((low, high))
     out = []
     for low, high in union(holes, JOIN):

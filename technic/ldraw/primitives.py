@@ -26,6 +26,7 @@ from technic.parts.definition import Port
 __all__ = [
     "Occurrence",
     "Walker",
+    "carries_ports",
     "features_from_primitives",
     "ports_from_primitives",
     "walker_of",
@@ -64,6 +65,8 @@ RULES: Final[dict[str, tuple[Rule, ...]]] = {
         ),
         ((K.AXLE_HOLE, *_UNIT),),
     ),
+    # the toothed rim of a half bush, in front of its axle hole
+    **{f"bushlo{n}": ((K.SOCKET_WALL, 0.0, 2.0),) for n in ("ck", "c2", "c3", "c4")},
     "axle": ((K.AXLE, *_UNIT),),
     "axlehol8": ((K.AXLE_PERIMETER, *_UNIT),),
     "axleho12": ((K.AXLE, *_UNIT),),
@@ -301,6 +304,15 @@ def ports_from_primitives(library: Library, number: str) -> tuple[Port, ...] | N
     """
     features = features_from_primitives(walker_of(library), number)
     return None if features is None else to_ports(features)
+
+
+def carries_ports(library: Library, key: str) -> bool:
+    """Tell whether the file at `key` is, or holds, a primitive that stands for a port."""
+    name = key.rsplit("/", 1)[-1].removesuffix(".dat")
+    if name in RULES:
+        return True
+    below = walker_of(library).occurrences(key)
+    return any(primitive.removesuffix(".dat") in RULES for primitive in below)
 
 
 def walker_of(library: Library) -> Walker:

@@ -130,21 +130,9 @@ class ShadowLibrary:
         except UnicodeDecodeError:
             return data.decode("latin-1")
 
-    def describes(self, library: Library, key: str, depth: int = 0) -> bool:
-        """Tell whether it says anything about the part at `key` or its subparts.
-
-        What a part inherits from primitives alone is not all it has: many of them have no shadow.
-        """
-        if key.removeprefix("unofficial/") in self.store:
-            return True
-        if depth > MAX_DEPTH:
-            return False
-        subparts = {
-            target
-            for reference in library.file(key).references
-            if (target := library.find(reference.name)) and "parts/" in target
-        }
-        return any(self.describes(library, target, depth + 1) for target in sorted(subparts))
+    def has(self, key: str) -> bool:
+        """Tell whether there is a shadow of the library file at `key` itself."""
+        return key.removeprefix("unofficial/") in self.store
 
     def where(self, key: str) -> str:
         """Return how a message names the shadow of the file at `key`."""

@@ -7,11 +7,42 @@ from dataclasses import replace
 from technic.ldraw.features import Feature, build_features, to_ports
 from technic.ldraw.library import Library
 from technic.ldraw.pieces import Piece
+from technic.ldraw.primitives import carries_ports
 from technic.ldraw.shadow import ShadowLibrary, snaps_of
 from technic.ldraw.snap_shapes import pieces_of
 from technic.parts.definition import Port, PortKind
 
-__all__ = ["features_from_shadow", "ports_from_shadow"]
+__all__ = ["describes", "features_from_shadow", "ports_from_shadow"]
+
+
+def describes(library: Library, shadow: ShadowLibrary, key: str) -> bool:
+    """Tell whether a shadow library describes the part at `key` as a whole.
+
+    A shadow of the part's own file does. Shadows of subparts alone do only when the part's file adds
+    nothing that has no shadow: many primitives have none (ends of holes, ends of axles), because the
+    parts that use them are expected to have one.
+
+    Parameters
+    ----------
+    library : Library
+    shadow : ShadowLibrary
+    key : str
+        Path in the library.
+    """
+    if shadow.has(key):
+        return True
+    described = False
+    for name in sorted({reference.name for reference in library.file(key).references}):
+        target = library.find(name)
+        if target is None or not carries_ports(library, target):
+            continue
+        if "parts/" in target:
+            if not describes(library, shadow, target):
+                return False
+            described = True
+        elif not snaps_of(shadow, library, target):
+            return False
+    return described
 
 
 def features_from_shadow(
@@ -19,7 +50,7 @@ def features_from_shadow(
 ) -> tuple[Feature, ...] | None:
     """Return the whole features of a part (LDU); None when the shadow library does not describe it."""
     key = library.key_of(number)
-    if key is None or not shadow.describes(library, key):
+    if key is None or not describes(library, shadow, key):
         return None
     snaps = snaps_of(shadow, library, key)
     if not snaps:

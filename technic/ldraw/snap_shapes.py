@@ -62,8 +62,11 @@ def _female(snap: Snap, spans: list[_Span], total: float) -> list[tuple[PieceKin
         out.append(_tube(snap, spans[0][2], spans[0][3]))
     for index, span in enumerate(spans):
         shape, _, start, end = span
+        beside = spans[max(index - 1, 0) : index + 2]
         if shape == "A":
             out.append((PieceKind.AXLE_HOLE, start, end))
+        elif _is_counterbore(span) and any(other[0] == "A" for other in beside):
+            out.append((PieceKind.SOCKET_WALL, start, end))
         elif _is_pin(span):
             out.append((PieceKind.WALL, start, end))
             if index and _is_counterbore(spans[index - 1]):
