@@ -14,7 +14,15 @@ import trimesh
 
 from technic.errors import SchemaError, UsageError
 from technic.parts.definition import PartDefinition
-from technic.parts.shapes import axles, beams, bricks, gears, pins, primitives  # noqa: F401
+from technic.parts.shapes import (  # noqa: F401 (they register their features)
+    axles,
+    beams,
+    bricks,
+    connectors,
+    gears,
+    pins,
+    primitives,
+)
 from technic.parts.shapes.bench import Bench
 from technic.parts.shapes.tables import build, shape_table
 from technic.units import LDU

@@ -47,3 +47,31 @@ def _shell(bench: Bench, table: Mapping[str, Any]) -> Manifold:
     wall, top = table.get("wall", 4.0), table.get("top", 4.0)
     inside = kernel.box(low + (wall, top, wall), high + (-wall, 1.0, -wall))
     return kernel.box(low, high) - inside
+
+
+@feature("rail")
+def _rail(bench: Bench, table: Mapping[str, Any]) -> Manifold:
+    """An I-shaped rail ``from`` ``to``: two plates square to ``normal``, joined by a web.
+
+    ``half``: distance of the outer faces from the middle (default 10); ``plate``: thickness of the
+    plates (3); ``depth``: half their depth (10); ``web``: thickness of the web (2).
+    """
+    start, end = np.array(table["from"], float), np.array(table["to"], float)
+    normal = np.array([float(letter == table["normal"]) for letter in "xyz"])
+    side = np.cross(normal, end - start) / np.linalg.norm(end - start)
+    half, plate = table.get("half", 10.0), table.get("plate", 3.0)
+    depth, web = table.get("depth", 10.0), table.get("web", 2.0)
+    solids = [
+        kernel.box(start - half * normal - web / 2 * side, end + half * normal + web / 2 * side)
+    ]
+    for sign in (-1.0, 1.0):
+        outer, inner = sign * half * normal, sign * (half - plate) * normal
+        solids.append(kernel.box(start + outer - depth * side, end + inner + depth * side))
+    return kernel.union(solids)
+
+
+@feature("casing")
+def _casing(bench: Bench, table: Mapping[str, Any]) -> Manifold:
+    """A closed hollow box ``min`` ``max`` with walls ``wall`` thick."""
+    low, high, wall = np.array(table["min"], float), np.array(table["max"], float), table["wall"]
+    return kernel.box(low, high) - kernel.box(low + wall, high - wall)
