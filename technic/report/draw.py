@@ -89,7 +89,7 @@ def _add_lights(plotter: pyvista.Plotter, panel: Panel) -> None:
 def paint(panel: Panel, size: tuple[int, int]) -> tuple[NDArray[np.uint8], float]:
     """Return the picture of one panel, (height, width, 3), and its pixels per metre."""
     plotter = pyvista.Plotter(off_screen=True, window_size=list(size), lighting="none")
-    plotter.background_color = "white"
+    plotter.background_color = pyvista.Color("white")
     _add_lights(plotter, panel)
     plotter.enable_anti_aliasing(aa_type="msaa", multi_samples=4)
     for lines in panel.lines:

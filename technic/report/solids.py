@@ -87,9 +87,10 @@ def _tubes(part: Part | PartDefinition) -> Surface:
     for port in part.ports:
         half = 0.5 * max(port.length, _PORT_RADIUS) * port.axis
         pieces.append(tube(port.position - half, port.position + half, _PORT_RADIUS, NEUTRAL))
-    if not isinstance(body, FrameBody) and part.ports:
-        pieces += _struts(np.array([port.position for port in part.ports]))
     centroid = part.mass_properties.centroid
+    if not isinstance(body, FrameBody) and part.ports:
+        # The centroid too: loads act there.
+        pieces += _struts(np.array([*(port.position for port in part.ports), centroid]))
     if not pieces:
         half = np.array([0.0, _PORT_RADIUS, 0.0])
         pieces.append(tube(centroid - half, centroid + half, _PORT_RADIUS, NEUTRAL))

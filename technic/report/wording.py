@@ -10,6 +10,7 @@ import numpy as np
 
 from technic.assembly.model import Assembly, Part
 from technic.geometry import Array
+from technic.parts.definition import PortKind
 from technic.report.palette import color_name
 from technic.rigidity.result import WeakSpot
 
@@ -111,11 +112,23 @@ def part_names(assembly: Assembly, parts: Sequence[int], limit: int = 3) -> str:
     return joined(said)
 
 
+_ENTERS = frozenset({PortKind.PIN, PortKind.AXLE, PortKind.BALL, PortKind.STUD})
+
+
+def _enters(part: Part, port: str) -> bool:
+    return any(p.name == port and p.kind in _ENTERS for p in part.ports)
+
+
 def spot_words(assembly: Assembly, spot: WeakSpot) -> str:
     """Return what gives way at a weak spot: "bending of a beam", or "pin in beam" for a joint."""
-    parts = sorted((assembly.parts[k] for k in spot.parts), key=lambda part: not part.fastener)
-    names = [part_name(part) for part in parts]
+    first, *others = (assembly.parts[k] for k in spot.parts)
     if spot.kind != "joint":
-        return f"bending of {names[0]}"
-    word = "in" if parts[0].fastener and not parts[-1].fastener else "with"
-    return f" {word} ".join(names)
+        return f"bending of {part_name(first)}"
+    (second,) = others
+    ports = assembly.joints[spot.index].ports
+    inside = None if ports is None else [_enters(first, ports[0]), _enters(second, ports[1])]
+    if inside == [True, False]:
+        return f"{part_name(first)} in {part_name(second)}"
+    if inside == [False, True]:
+        return f"{part_name(second)} in {part_name(first)}"
+    return f"{part_name(first)} with {part_name(second)}"

@@ -11,11 +11,13 @@ from technic.errors import UsageError
 from technic.geometry import Pose
 from technic.parts.definition import MassProperties, Port, PortKind, RigidBody
 
+UP = np.array([0.0, 1.0, 0.0])
+
 
 def part(ident, number, name, x=0.0):
     ports = (
-        Port("hole1", PortKind.PIN_HOLE, [0.0, 0.0, 0.01], [0, 1, 0], 0.008),
-        Port("hole2", PortKind.PIN_HOLE, [0.0, 0.0, 0.02], [0, 1, 0], 0.008),
+        Port("hole1", PortKind.PIN_HOLE, np.array([0.0, 0.0, 0.01]), UP, 0.008),
+        Port("hole2", PortKind.PIN_HOLE, np.array([0.0, 0.0, 0.02]), UP, 0.008),
     )
     mass = MassProperties(1e-3, np.zeros(3), 1e-7 * np.eye(3))
     pose = Pose(np.eye(3), np.array([x, 0.0, 0.0]))
@@ -97,7 +99,8 @@ def test_fix_a_part_holds_it_as_a_whole(assembly):
 
 def test_fix_a_port_holds_it_where_it_stands_in_the_world(assembly):
     support = parse_fix(assembly, "12:32524:HOLE2")
-    np.testing.assert_allclose(support.point, [0.1, 0.0, 0.02])
+    assert support.point is not None
+    np.testing.assert_allclose(support.point, np.array([0.1, 0.0, 0.02]))
 
 
 def test_fix_with_an_ambiguous_part_and_a_port_says_which(assembly):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -36,7 +37,7 @@ def write_model(path: Path, lines: list[str]) -> Path:
 def make_report(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., RigidityReport]:
     """From LDraw lines to the report."""
 
-    def make(lines: list[str], name: str = "example", **options: object) -> RigidityReport:
+    def make(lines: list[str], name: str = "example", **options: Any) -> RigidityReport:
         path = write_model(tmp_path_factory.mktemp("model") / f"{name}.ldr", lines)
         return technic.analyze(technic.load(path), **options)
 

@@ -138,7 +138,9 @@ def test_ids_lead_back_to_the_file(pair):
 
 def test_worst_load_of_one_newton_does_the_work_that_the_rigidity_says(make_report, models):
     report = make_report(models["pair"], parts="rigid")
-    forces, twists = unit_load(report)
+    load = unit_load(report)
+    assert load is not None
+    forces, twists = load
     # Rigid parts: the work of the forces and moments is all the work there is, f.x = 1 N * (1 N / lambda).
     assert np.sum(forces * twists) == pytest.approx(1.0 / report.rigidity.value, rel=1e-9)
 

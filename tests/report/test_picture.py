@@ -113,6 +113,7 @@ def test_camera_does_not_look_along_the_movement():
 
 def test_field_has_the_rms_displacement_that_the_report_says(pair):
     field = worst_field(pair)
+    assert field is not None
     square = (field.displacements**2).sum(axis=1)
     rms = np.sqrt(field.weights @ square / field.weights.sum())
     # Samples at nodes instead of an integral over the material: near, not equal.
@@ -162,7 +163,9 @@ def test_picture_of_a_flexible_model(scissors, tmp_path):
 
 
 def test_picture_of_a_part(tmp_path):
-    scene = part_scene(catalogue().get("32316"))
+    definition = catalogue().get("32316")
+    assert definition is not None
+    scene = part_scene(definition)
     painter = Painter()
     painter.draw(scene, tmp_path / "beam.png")
     with Image.open(tmp_path / "beam.png") as image:
@@ -188,5 +191,6 @@ def test_machine_that_cannot_draw_is_told_what_to_install(pair, tmp_path, monkey
 def test_painter_that_draws_nothing_leaves_no_process():
     painter = Painter()
     process = painter._process
+    assert process is not None
     painter.close()
     assert process.returncode is not None

@@ -15,6 +15,13 @@ from technic.report.text import to_text
 from technic.rigidity.result import MotionKind, Verdict
 
 
+def find(pattern, text):
+    """First match; fails when there is none."""
+    match = re.search(pattern, text)
+    assert match is not None, pattern
+    return match
+
+
 def with_assembly(report, **changes):
     return dataclasses.replace(report, assembly=dataclasses.replace(report.assembly, **changes))
 
@@ -30,9 +37,9 @@ def test_rigid_model(pair):
 
 
 def test_rigidity_in_words_is_that_of_the_report(pair):
-    value = float(re.search(r"Rigidity  (\S+) N/m", to_text(pair))[1])
+    value = float(find(r"Rigidity  (\S+) N/m", to_text(pair))[1])
     assert value == pytest.approx(pair.rigidity.value, rel=5e-3)
-    millimetres = float(re.search(r"moves it (\S+) mm", to_text(pair))[1])
+    millimetres = float(find(r"moves it (\S+) mm", to_text(pair))[1])
     assert millimetres == pytest.approx(1e3 / pair.rigidity.value, rel=5e-3)
 
 
@@ -48,7 +55,7 @@ def test_flexible_model_names_number_first_motion_and_usual_cause(scissors):
 
 def test_weakest_spot_names_part_number_colour_place_and_share(pair):
     said = to_text(pair)
-    first = re.search(r"  1\. +(\d+\.\d) %  (.*\n.*)", said)
+    first = find(r"  1\. +(\d+\.\d) %  (.*\n.*)", said)
     assert float(first[1]) == pytest.approx(100 * pair.weak_spots[0].energy_share, abs=0.06)
     assert re.search(r"32316, red|32316, blue|2780, black|32316, ", first[2])
     assert re.search(r"pair\.ldr step \d, line \d", said)
