@@ -26,7 +26,7 @@ from technic.units import LDU  # noqa: E402
 
 Point = tuple[float, ...]
 Run = tuple[Point, tuple[tuple[int, Point], ...]]
-_LETTERS = {(1, 0, 0): "x", (0, 1, 0): "y", (0, 0, 1): "z"}
+_LETTERS: dict[tuple[int, ...], str] = {(1, 0, 0): "x", (0, 1, 0): "y", (0, 0, 1): "z"}
 
 
 def _tidy(value: float) -> float:

@@ -139,7 +139,7 @@ def solid(triangles: Array, wanted: float) -> tuple[Array, Array]:
     return (np.argwhere(votes >= 2) + 0.5) * cell + low, cell
 
 
-def properties(triangles: Array, wanted: float, density: float) -> dict[str, Any]:
+def properties(triangles: Array, wanted: float, density: float, source: str) -> dict[str, Any]:
     """Return the mass properties of the solid that `triangles` bound."""
     size = triangles.max((0, 1)) - triangles.min((0, 1))
     # no more than some two million cells
@@ -156,7 +156,21 @@ def properties(triangles: Array, wanted: float, density: float) -> dict[str, Any
         "centroid_m": [_round(c) for c in centroid * LDU],
         "inertia_kg_m2": [[_round(v) for v in row] for row in inertia],
         "volume_m3": _round(volume),
-        "source": "LDraw geometry 2026-02",
+        "source": source,
+    }
+
+
+def weighed(found: dict[str, Any], row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return mass properties scaled to the mass that the row gives: housings are not full of ABS."""
+    if "mass_g" not in row:
+        return found
+    factor = row["mass_g"] * 1e-3 / found["mass_kg"]
+    inertia = [[_round(v * factor) for v in line] for line in found["inertia_kg_m2"]]
+    return {
+        **found,
+        "mass_kg": row["mass_g"] * 1e-3,
+        "inertia_kg_m2": inertia,
+        "source": row["mass_source"],
     }
 
 
@@ -175,7 +189,9 @@ def main() -> None:
     known: dict[str, Mapping[str, Any]] = {}
     if MASS_FILE.exists():
         known = json.loads(MASS_FILE.read_text(encoding="utf-8"))
-    surfaces = Surfaces(Library.open(asked.library))
+    library = Library.open(asked.library)
+    source = f"LDraw geometry {library.release()}"
+    surfaces = Surfaces(library)
     names = Catalogue(rows, known)
     for part in asked.only or [p for p in rows if p not in known]:
         row = rows[part][1]
@@ -184,7 +200,8 @@ def main() -> None:
             print(f"{part}: no geometry", file=sys.stderr)
             continue
         density = material(row.get("material", ABS)).density
-        known[part] = properties(triangles, asked.pitch, density)
+        found = properties(triangles, asked.pitch, density, source)
+        known[part] = weighed(found, row)
         print(f"{part}: {known[part]['mass_kg'] * 1e3:.3f} g", file=sys.stderr)
     ordered = {part: known[part] for part in names.ids() if part in known}
     lines = [f"{json.dumps(part)}: {json.dumps(ordered[part])}" for part in ordered]

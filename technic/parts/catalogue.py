@@ -137,9 +137,11 @@ class Catalogue:
         try:
             plain = expand(table, row)
             title, family = str(plain["title"]), str(plain["family"])
-            mass = self._masses[part]
         except KeyError as error:
             raise SchemaError([f"{part}: {error} is missing"]) from error
+        mass = self._masses.get(part)
+        if mass is None:
+            raise SchemaError([f"{part} is not in mass.json; scripts/ldraw_mass.py measures it"])
         made_of = material(plain.get("material", ABS))
         body: Body = RigidBody()
         if "frame" in plain:

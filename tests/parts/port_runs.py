@@ -14,7 +14,11 @@ __all__ = ["runs"]
 ROUND = 0.05
 """LDU; LDraw gives slanted directions to four digits, so positions differ in the second decimal."""
 
-LETTERS = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
+LETTERS: dict[tuple[float, ...], str] = {
+    (1.0, 0.0, 0.0): "x",
+    (0.0, 1.0, 0.0): "y",
+    (0.0, 0.0, 1.0): "z",
+}
 DIRECTED = (PortKind.STUD,)
 DIVIDED = (PortKind.PIN, PortKind.PIN_HOLE, PortKind.AXLE_HOLE)
 ROUND_KINDS = (PortKind.BALL, PortKind.SOCKET)
@@ -45,7 +49,9 @@ def runs(ports: Iterable[Port]) -> list[str]:
         along = float(place @ axis / (axis @ axis))
         foot = tuple(_number(c) for c in place - along * axis)
         half = port.length / LDU / 2
-        lines.setdefault((word, tuple(axis.tolist()), foot), []).append((along - half, along + half))
+        lines.setdefault((word, tuple(axis.tolist()), foot), []).append(
+            (along - half, along + half)
+        )
     for (word, axis_key, foot), spans in lines.items():
         axis = np.array(axis_key)
         base = np.array([float(c) for c in foot])

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.parts.port_runs import runs
 
 from technic.errors import SchemaError
 from technic.geometry import Pose
@@ -21,6 +20,7 @@ from technic.ldraw.primitives import ports_from_primitives
 from technic.parts.catalogue import Catalogue, catalogue
 from technic.parts.definition import FrameBody, Port, PortKind
 from technic.units import LDU
+from tests.parts.port_runs import runs
 
 HERE = Path(__file__).parent
 PITCH = 20 * LDU
@@ -40,6 +40,11 @@ def _accepted() -> dict[str, dict[str, Any]]:
 
 
 ACCEPTED = _accepted()
+
+NOT_COVERED = {
+    "68488": "small SPIKE motor: its files came after the 2022-06 library and are not in the subset",
+}
+"""Parts of the reference list without a definition, and why."""
 
 
 def _compared(ports: tuple[Port, ...]) -> set[str]:
@@ -120,9 +125,8 @@ def test_parts_beyond_the_library_name_their_source(library: Library) -> None:
 # --- against the reference list ---------------------------------------------------------------
 def test_every_part_of_the_reference_list_resolves(reference: list[dict[str, str]]) -> None:
     parts = catalogue()
-    missing = [row["ldraw_id"] for row in reference if parts.get(row["ldraw_id"]) is None]
-    assert len(reference) - len(missing) >= 240
-    assert not missing, missing
+    missing = {row["ldraw_id"] for row in reference if parts.get(row["ldraw_id"]) is None}
+    assert missing == set(NOT_COVERED)
 
 
 def test_aliases_of_the_reference_list_lead_to_the_same_part(
@@ -191,7 +195,8 @@ def test_unknown_numbers_give_none() -> None:
 def test_parts_that_look_alike_stay_apart() -> None:
     parts = catalogue()
     two_holes, axle_end = parts.get("43857"), parts.get("60483")
-    assert two_holes is not None and axle_end is not None
+    assert two_holes is not None
+    assert axle_end is not None
     assert {p.kind for p in two_holes.ports} == {PortKind.PIN_HOLE}
     assert {p.kind for p in axle_end.ports} == {PortKind.PIN_HOLE, PortKind.AXLE_HOLE}
 
@@ -265,7 +270,10 @@ def test_stops_the_primitives_hide() -> None:
 
 # --- files ------------------------------------------------------------------------------------
 def test_a_number_given_twice_is_refused() -> None:
-    rows = {"1": ("part", {"id": "1", "aliases": ["2"]}), "2": ("part", {"id": "2"})}
+    rows: dict[str, tuple[str, dict[str, Any]]] = {
+        "1": ("part", {"id": "1", "aliases": ["2"]}),
+        "2": ("part", {"id": "2"}),
+    }
     with pytest.raises(SchemaError, match="2 is given by 1 and by 2"):
         Catalogue(rows, {})
 
