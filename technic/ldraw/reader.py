@@ -196,7 +196,10 @@ def _reason(placement: Placement) -> str:
 def _flexible(label: str, pieces: tuple[Placement, ...]) -> Finding:
     count = "1 piece" if len(pieces) == 1 else f"{len(pieces)} pieces"
     numbers = ", ".join(sorted({piece.number for piece in pieces}))
-    message = f"{label}: flexible, not modelled ({count}: {numbers})"
+    kind, found, path = label.partition(" in ")
+    where = f"{kind}{found}{path.rpartition('/')[2]}"
+    lines = f"line {pieces[0].line}" + (f" to {pieces[-1].line}" if len(pieces) > 1 else "")
+    message = f"{where}: flexible, not modelled ({count}: {numbers}; {lines})"
     return Finding(FindingKind.FLEXIBLE, message)
 
 
