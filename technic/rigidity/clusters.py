@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import networkx as nx
 import numpy as np
 from scipy import sparse
 
 from technic.geometry import Array, shift_twist
+from technic.groups import connected_groups
 from technic.rigidity.kinematics import ComponentMotions, Kinematics
 from technic.tolerances import MOTION_KIND_CUT
 
@@ -80,12 +80,12 @@ def find_clusters(kin: Kinematics, motions: ComponentMotions, links: list[int]) 
     motion belong together, and so does the pin then.
     """
     slip = joint_slip(kin, motions, links)
-    graph = nx.Graph()
-    graph.add_nodes_from(motions.parts)
-    for k, row in zip(links, slip, strict=True):
-        if len(kin.owners[k]) == 2 and row.max() < MOTION_KIND_CUT:
-            graph.add_edge(*kin.owners[k])
-    first = [tuple(sorted(c)) for c in nx.connected_components(graph)]
+    still = [
+        (kin.owners[k][0], kin.owners[k][1])
+        for k, row in zip(links, slip, strict=True)
+        if len(kin.owners[k]) == 2 and row.max() < MOTION_KIND_CUT
+    ]
+    first = connected_groups(motions.parts, still)
     home = {p: n for n, parts in enumerate(first) for p in parts}
     fasteners = {
         n for n, parts in enumerate(first) if all(kin.assembly.parts[p].fastener for p in parts)
@@ -96,11 +96,11 @@ def find_clusters(kin: Kinematics, motions: ComponentMotions, links: list[int]) 
         if len(homes) > 1 or len(kin.owners[k]) == 1:
             for n in homes:
                 outer[n].append(k)
-    bonds = nx.Graph()
-    bonds.add_nodes_from(range(len(first)))
+    rows = motions.twists.tocsr()
+    bonds: list[tuple[int, int]] = []
     for n in sorted(fasteners):
-        _bond_neighbors(kin, motions, first[n], outer[n], home, bonds, n)
-    groups = [tuple(sorted(g)) for g in nx.connected_components(bonds)]
+        bonds += _bonds(kin, motions.parts, rows, first[n], outer[n], home, n)
+    groups = connected_groups(range(len(first)), bonds)
     clusters = []
     for group in groups:
         parts = tuple(sorted(p for n in group for p in first[n]))
@@ -114,42 +114,39 @@ def find_clusters(kin: Kinematics, motions: ComponentMotions, links: list[int]) 
     return sorted(clusters, key=lambda c: (c.fasteners_only, -c.mass, c.parts))
 
 
-def _bond_neighbors(
+def _bonds(
     kin: Kinematics,
-    motions: ComponentMotions,
+    everyone: tuple[int, ...],
+    rows: sparse.csr_array,
     parts: tuple[int, ...],
     outer: list[int],
     home: dict[int, int],
-    bonds: nx.Graph,
     own: int,
-) -> None:
+) -> list[tuple[int, int]]:
     """Bond the neighbours of a fastener that move alike, and the fastener when all of them do."""
-    place = {p: k for k, p in enumerate(motions.parts)}
+    place = {p: k for k, p in enumerate(everyone)}
     neighbors: dict[int, int] = {}
     for k in outer:
         if len(kin.owners[k]) == 1:
-            return
+            return []
         for p in kin.owners[k]:
             if p not in parts:
                 neighbors.setdefault(home[p], p)
-    if not neighbors:
-        return
     point = kin.origins[parts[0]]
-    rows = motions.twists.tocsr()
     twists = {}
     for n, p in neighbors.items():
         arm = (point - kin.origins[p]) / kin.length
         twists[n] = shift_twist(arm) @ rows[6 * place[p] : 6 * place[p] + 6].toarray()
     order = sorted(neighbors)
-    alike = nx.Graph()
-    alike.add_nodes_from(order)
-    for i, a in enumerate(order):
-        for b in order[i + 1 :]:
-            if np.abs(twists[a] - twists[b]).max(initial=0.0) < MOTION_KIND_CUT:
-                alike.add_edge(a, b)
-    bonds.add_edges_from(alike.edges)
-    if len(order) > 1 and nx.is_connected(alike):
-        bonds.add_edge(own, order[0])
+    alike = [
+        (a, b)
+        for i, a in enumerate(order)
+        for b in order[i + 1 :]
+        if np.abs(twists[a] - twists[b]).max(initial=0.0) < MOTION_KIND_CUT
+    ]
+    if len(order) > 1 and len(connected_groups(order, alike)) == 1:
+        alike.append((own, order[0]))
+    return alike
 
 
 def _cluster(kin: Kinematics, parts: tuple[int, ...], outer: tuple[int, ...]) -> Cluster:

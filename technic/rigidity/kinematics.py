@@ -9,13 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from technic.assembly.model import Assembly
 from technic.geometry import Array, shift_twist
+from technic.groups import connected_groups
 from technic.rigidity.nullspace import Block, NullSpace, null_space
 from technic.system.rows import transfer
 from technic.tolerances import MOBILITY_LENGTH
@@ -142,11 +142,8 @@ def _length(assembly: Assembly, reference: Array) -> float:
 
 
 def _components(assembly: Assembly) -> tuple[tuple[int, ...], ...]:
-    graph = nx.Graph()
-    graph.add_nodes_from(range(len(assembly.parts)))
-    graph.add_edges_from(j.parts for j in assembly.joints)
     mass = [p.mass_properties.mass for p in assembly.parts]
-    found = [tuple(sorted(c)) for c in nx.connected_components(graph)]
+    found = connected_groups(range(len(assembly.parts)), (j.parts for j in assembly.joints))
     return tuple(sorted(found, key=lambda c: (-sum(mass[k] for k in c), c)))
 
 
@@ -192,14 +189,10 @@ def _merge_fixed(kin: Kinematics, parts: tuple[int, ...], links: list[int]) -> d
 
     The head is the part nearest to the body's middle, so that arms stay short.
     """
-    graph = nx.Graph()
-    graph.add_nodes_from(parts)
-    graph.add_edges_from(
-        kin.owners[k] for k in links if len(kin.owners[k]) == 2 and kin.held[k].all()
-    )
+    pairs = [kin.owners[k] for k in links if len(kin.owners[k]) == 2 and kin.held[k].all()]
     heads: dict[int, int] = {}
-    for group in nx.connected_components(graph):
-        members = sorted(group)
+    for group in connected_groups(parts, ((a, b) for a, b in pairs)):
+        members = list(group)
         middle = kin.origins[members].mean(axis=0)
         near = np.linalg.norm(kin.origins[members] - middle, axis=1).round(9)
         head = members[int(np.argmin(near))]
