@@ -9,6 +9,7 @@ material. Shape functions with shear: J. S. Przemieniecki, *Theory of Matrix Str
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,17 +55,20 @@ def frame_element(body: FrameBody, properties: MassProperties, attachments: Arra
     n = len(node_points)
     stiffness = np.zeros((6 * n, 6 * n))
     mass = np.zeros((6 * n, 6 * n))
-    for (a, b), member in zip(pairs, member_of, strict=True):
-        block, inertia = member_matrices(
-            node_points[a],
-            node_points[b],
-            body.normals[member],
-            body.sections[member],
+    ends = np.array(pairs)
+    for section in set(member_of):
+        chosen = [k for k, m in enumerate(member_of) if m == section]
+        blocks = member_matrices(
+            node_points[ends[chosen, 0]],
+            node_points[ends[chosen, 1]],
+            body.normals[section],
+            body.sections[section],
             body.material,
         )
-        dofs = np.r_[6 * a : 6 * a + 6, 6 * b : 6 * b + 6]
-        stiffness[np.ix_(dofs, dofs)] += block
-        mass[np.ix_(dofs, dofs)] += inertia
+        dofs = (6 * ends[chosen][:, :, None] + np.arange(6)).reshape(-1, 12)
+        place = (dofs[:, :, None], dofs[:, None, :])
+        np.add.at(stiffness, place, blocks[0])
+        np.add.at(mass, place, blocks[1])
     rigid = shift_twist(node_points - properties.centroid).reshape(6 * n, 6)
     unscaled = float(rigid[:, 0] @ mass @ rigid[:, 0])
     mass *= properties.mass / unscaled
@@ -155,96 +159,110 @@ def _grouped(stations: list[tuple[float, int]], close: float) -> list[list[tuple
 def member_matrices(
     p: Array, q: Array, normal: Array, section: Section, material: Material
 ) -> tuple[Array, Array]:
-    """Return stiffness and consistent mass of one member, in part axes.
+    """Return stiffness and consistent mass of elements of one member, in part axes.
 
     Parameters
     ----------
-    p, q : (3,) ndarray
-        Its ends (m).
+    p, q : (m, 3) ndarray
+        Ends of the elements (m).
     normal : (3,) ndarray
-        Direction of its own z axis; made orthogonal to the member.
+        Direction of the member's own z axis; made orthogonal to the member.
     section : Section
     material : Material
 
     Returns
     -------
-    (12, 12) ndarray, (12, 12) ndarray
+    (m, 12, 12) ndarray, (m, 12, 12) ndarray
         Unknowns: translation and rotation of `p`, then of `q`.
+
+    Raises
+    ------
+    InputError
+        The normal is parallel to the member.
     """
-    span = q - p
-    length = float(np.linalg.norm(span))
-    x = span / length
+    spans = q - p
+    lengths = np.linalg.norm(spans, axis=1)
+    x = spans[0] / lengths[0]
     z = normal - (normal @ x) * x
     size = float(np.linalg.norm(z))
-    if size < 1e-9:
+    if size < 1e-9 * float(np.linalg.norm(normal)):
         raise InputError("the normal of a frame member is parallel to the member")
     z = z / size
     turn = np.kron(np.eye(2), turn_twist(np.array([x, np.cross(z, x), z])))
-    k = _local_stiffness(length, section, material)
-    m = _local_mass(length, section, material)
+    k = _local_stiffness(lengths, section, material)
+    m = _local_mass(lengths, section, material)
     return turn.T @ k @ turn, turn.T @ m @ turn
 
 
-def _shear_ratio(length: float, inertia: float, shear: float, material: Material) -> float:
+AXIAL: Any = np.ix_([0, 6], [0, 6])
+TORSION: Any = np.ix_([3, 9], [3, 9])
+BENDING: Any = (
+    (np.ix_([1, 5, 7, 11], [1, 5, 7, 11]), 1.0),
+    (np.ix_([2, 4, 8, 10], [2, 4, 8, 10]), -1.0),
+)
+"""Places of the unknowns of bending in the plane of x and y, then of x and z; sign of the rotation."""
+
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
+
+
+def _bending(section: Section) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return second moment and shear area of bending in the plane of x and y, then of x and z."""
+    return (section.inertia_z, section.shear_y), (section.inertia_y, section.shear_z)
+
+
+def _shear_ratio(lengths: Array, inertia: float, shear: float, material: Material) -> Array:
     """Return ``12 E I / (G A_s L^2)``."""
-    return 12.0 * material.young_pa * inertia / (material.shear_pa * shear * length**2)
+    return 12.0 * material.young_pa * inertia / (material.shear_pa * shear * lengths**2)
 
 
-def _local_stiffness(length: float, section: Section, material: Material) -> Array:
+def _local_stiffness(lengths: Array, section: Section, material: Material) -> Array:
     e, g = material.young_pa, material.shear_pa
-    k = np.zeros((12, 12))
-    for i, c in ((0, e * section.area / length), (3, g * section.torsion / length)):
-        k[np.ix_([i, i + 6], [i, i + 6])] = c * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    for inertia, shear, dofs, sign in (
-        (section.inertia_z, section.shear_y, [1, 5, 7, 11], 1.0),
-        (section.inertia_y, section.shear_z, [2, 4, 8, 10], -1.0),
-    ):
-        phi = _shear_ratio(length, inertia, shear, material)
-        a, b = 4.0 + phi, 2.0 - phi
-        s = sign * length
+    k = np.zeros((len(lengths), 12, 12))
+    pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    k[:, *AXIAL] = (e * section.area / lengths)[:, None, None] * pair
+    k[:, *TORSION] = (g * section.torsion / lengths)[:, None, None] * pair
+    for (place, sign), (inertia, shear) in zip(BENDING, _bending(section), strict=True):
+        phi = _shear_ratio(lengths, inertia, shear, material)
+        s, one = sign * lengths, np.ones_like(lengths)
+        a, b = (4.0 + phi) * s * s, (2.0 - phi) * s * s
         block = np.array(
             [
-                [12, 6 * s, -12, 6 * s],
-                [6 * s, a * s * s, -6 * s, b * s * s],
-                [-12, -6 * s, 12, -6 * s],
-                [6 * s, b * s * s, -6 * s, a * s * s],
+                [12 * one, 6 * s, -12 * one, 6 * s],
+                [6 * s, a, -6 * s, b],
+                [-12 * one, -6 * s, 12 * one, -6 * s],
+                [6 * s, b, -6 * s, a],
             ]
         )
-        k[np.ix_(dofs, dofs)] = e * inertia / (length**3 * (1.0 + phi)) * block
+        scale = e * inertia / (lengths**3 * (1.0 + phi))
+        k[:, *place] = np.moveaxis(block, 2, 0) * scale[:, None, None]
     return k
 
 
-def _local_mass(length: float, section: Section, material: Material) -> Array:
+def _local_mass(lengths: Array, section: Section, material: Material) -> Array:
     rho = material.density
-    m = np.zeros((12, 12))
-    linear = length / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]])
-    m[np.ix_([0, 6], [0, 6])] = rho * section.area * linear
-    m[np.ix_([3, 9], [3, 9])] = rho * (section.inertia_y + section.inertia_z) * linear
-    points, weights = np.polynomial.legendre.leggauss(4)
-    xi, w = (points + 1.0) / 2.0, weights / 2.0 * length
-    for inertia, shear, dofs, sign in (
-        (section.inertia_z, section.shear_y, [1, 5, 7, 11], 1.0),
-        (section.inertia_y, section.shear_z, [2, 4, 8, 10], -1.0),
-    ):
-        phi = _shear_ratio(length, inertia, shear, material)
-        s = sign * length
-        deflection = np.array(
-            [
-                1 - 3 * xi**2 + 2 * xi**3 + phi * (1 - xi),
-                s * (xi - 2 * xi**2 + xi**3 + phi / 2 * (xi - xi**2)),
-                3 * xi**2 - 2 * xi**3 + phi * xi,
-                s * (-(xi**2) + xi**3 - phi / 2 * (xi - xi**2)),
-            ]
-        ) / (1.0 + phi)
-        rotation = np.array(
-            [
-                6 * (xi**2 - xi) / s,
-                1 - 4 * xi + 3 * xi**2 + phi * (1 - xi),
-                6 * (xi - xi**2) / s,
-                3 * xi**2 - 2 * xi + phi * xi,
-            ]
-        ) / (1.0 + phi)
-        block = rho * section.area * (deflection * w) @ deflection.T
-        block += rho * inertia * (rotation * w) @ rotation.T
-        m[np.ix_(dofs, dofs)] = block
+    m = np.zeros((len(lengths), 12, 12))
+    linear = lengths[:, None, None] / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]])
+    m[:, *AXIAL] = rho * section.area * linear
+    m[:, *TORSION] = rho * (section.inertia_y + section.inertia_z) * linear
+    xi = (POINTS + 1.0) / 2.0
+    weights = WEIGHTS / 2.0 * lengths[:, None]
+    for (place, sign), (inertia, shear) in zip(BENDING, _bending(section), strict=True):
+        phi = _shear_ratio(lengths, inertia, shear, material)[:, None]
+        s = sign * lengths[:, None]
+        deflection = [
+            1 - 3 * xi**2 + 2 * xi**3 + phi * (1 - xi),
+            s * (xi - 2 * xi**2 + xi**3 + phi / 2 * (xi - xi**2)),
+            3 * xi**2 - 2 * xi**3 + phi * xi,
+            s * (-(xi**2) + xi**3 - phi / 2 * (xi - xi**2)),
+        ]
+        rotation = [
+            6 * (xi**2 - xi) / s,
+            1 - 4 * xi + 3 * xi**2 + phi * (1 - xi),
+            6 * (xi - xi**2) / s,
+            3 * xi**2 - 2 * xi + phi * xi,
+        ]
+        w = np.stack(deflection, axis=1) / (1.0 + phi[..., None])
+        t = np.stack(rotation, axis=1) / (1.0 + phi[..., None])
+        m[:, *place] = rho * section.area * (w * weights[:, None]) @ np.swapaxes(w, 1, 2)
+        m[:, *place] += rho * inertia * (t * weights[:, None]) @ np.swapaxes(t, 1, 2)
     return m

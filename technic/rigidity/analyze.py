@@ -31,7 +31,7 @@ from technic.rigidity.result import (
     Verdict,
 )
 from technic.rigidity.sentences import motion_sentence, not_modelled, reason
-from technic.rigidity.worst_case import mode_of, node_fields, weak_spots
+from technic.rigidity.worst_case import mode_of, node_fields, rigid_parts, weak_spots
 from technic.system.assemble import ElementFactory, System, assemble, element_of, rigid_element_of
 from technic.tolerances import MAIN_COMPONENT_SHARE, MOBILITY_GAP
 
@@ -188,11 +188,14 @@ def _elastic(
     value = float(pairs.values[0])
     frequency = float(np.sqrt(value / mass) / (2 * np.pi)) if measure == "mean_square" else None
     rigidity = Rigidity(value, frequency, measure, float(pairs.residuals[0]))
+    if not shown:
+        return rigidity, ()
     out = []
-    for k in range(len(pairs.values) if shown else 0):
+    inertia = rigid_parts(system)
+    for k in range(len(pairs.values)):
         unknowns: Array = np.zeros(system.size)
         unknowns[own] = pairs.vectors[:, k]
-        out.append(mode_of(system, float(pairs.values[k]), unknowns, measure))
+        out.append(mode_of(system, inertia, float(pairs.values[k]), unknowns, measure))
     return rigidity, tuple(out)
 
 

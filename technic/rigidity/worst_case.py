@@ -8,10 +8,30 @@ from technic.geometry import Array, turn_twist
 from technic.rigidity.result import Mode, WeakSpot
 from technic.system.assemble import System
 
-__all__ = ["mode_of", "node_fields", "weak_spots"]
+__all__ = ["mode_of", "node_fields", "rigid_parts", "weak_spots"]
 
 
-def mode_of(system: System, value: float, unknowns: Array, measure: str) -> Mode:
+def rigid_parts(system: System) -> Array:
+    """Return what turns momentum into the nearest rigid motion: the inverse inertia of every part.
+
+    Parameters
+    ----------
+    system : System
+
+    Returns
+    -------
+    (p, 6, 6) ndarray
+        About the centroid, world axes (1/kg and consistent).
+    """
+    squares = {id(e): e.rigid.T @ e.mass @ e.rigid for e in system.elements}
+    inertia = np.array([squares[id(e)] for e in system.elements])
+    turn = turn_twist(np.array([p.pose.rotation for p in system.assembly.parts]))
+    return turn @ np.linalg.pinv(inertia, rcond=1e-12, hermitian=True) @ np.swapaxes(turn, 1, 2)
+
+
+def mode_of(
+    system: System, inverse_inertia: Array, value: float, unknowns: Array, measure: str
+) -> Mode:
     """Return movement and load of every part in an elastic mode.
 
     A part's twist is that of the rigid motion nearest to its movement in the mean square, so the
@@ -20,6 +40,8 @@ def mode_of(system: System, value: float, unknowns: Array, measure: str) -> Mode
     Parameters
     ----------
     system : System
+    inverse_inertia : (p, 6, 6) ndarray
+        From `rigid_parts`.
     value : float
         Eigenvalue.
     unknowns : (n,) ndarray
@@ -27,18 +49,10 @@ def mode_of(system: System, value: float, unknowns: Array, measure: str) -> Mode
     measure : str
         "mean_square": the load is ``value * M x``; "nodal": ``value`` times the unweighted measure.
     """
-    parts = system.assembly.parts
-    rigid = system.R
-    momentum = rigid.T @ (system.mass_matrix @ unknowns)
+    momentum = (system.R.T @ (system.mass_matrix @ unknowns)).reshape(-1, 6)
     weight = system.M if measure == "mean_square" else system.nodal()
-    load = rigid.T @ (weight @ unknowns) * value
-    twists = np.zeros((len(parts), 6))
-    for k, (part, element) in enumerate(zip(parts, system.elements, strict=True)):
-        own = momentum[6 * k : 6 * k + 6]
-        if own.any():
-            turn = turn_twist(part.pose.rotation)
-            inertia = turn @ (element.rigid.T @ element.mass @ element.rigid) @ turn.T
-            twists[k] = np.linalg.lstsq(inertia, own, rcond=1e-12)[0]
+    load = system.R.T @ (weight @ unknowns) * value
+    twists = np.einsum("pij,pj->pi", inverse_inertia, momentum)
     return Mode(value, unknowns, twists, load.reshape(-1, 6))
 
 
