@@ -301,10 +301,10 @@ def _points(pieces: Iterable[Piece]) -> list[Feature]:
 
 
 def _sockets(line: Line) -> list[Feature]:
-    """Return the sockets of tow balls drawn as short round cups."""
+    """Return the sockets of tow balls: short round cups, some with slots at the sides."""
     rims = line.rounded(PieceKind.SOCKET_RIM, 0.5)
     out = []
-    for low, high in union(line.rounded(PieceKind.SOCKET_WALL, 0.7), JOIN):
+    for low, high in union(line.rounded(PieceKind.SOCKET_WALL, 0.5), JOIN):
         length = high - low
         if CUP[0] <= length <= CUP[1] and covered(low, high, rims) > 0.7:
             middle, half = (low + high) / 2.0, BALL_DIAMETER / 2.0
