@@ -16,6 +16,7 @@ READERS: dict[str, tuple[str, str]] = {
     ".mpd": ("technic.ldraw.reader", "load_ldraw"),
     ".dat": ("technic.ldraw.reader", "load_ldraw"),
     ".io": ("technic.ldraw.reader", "load_ldraw"),
+    ".json": ("technic.assembly.file", "load_assembly"),
 }
 """Module and function that read each kind of file, by suffix."""
 
@@ -26,7 +27,7 @@ def load(path: str | Path, **options: Any) -> Assembly:
     Parameters
     ----------
     path : path-like
-        LDraw (``.ldr``, ``.mpd``, ``.dat``).
+        LDraw (``.ldr``, ``.mpd``, ``.dat``) or an assembly file (``.json``).
     **options
         Passed on to the reader of the format, e.g. ``axle_slide="free"`` for LDraw files.
 
@@ -44,7 +45,9 @@ def load(path: str | Path, **options: Any) -> Assembly:
         raise InputError("no such file", path=path, remedy="Check the spelling of the path.")
     if path.is_dir():
         raise InputError(
-            "this is a directory", path=path, remedy="Name a model file in it (.ldr or .mpd)."
+            "this is a directory",
+            path=path,
+            remedy="Name a model file in it (.ldr, .mpd or .json).",
         )
     entry = READERS.get(path.suffix.lower())
     if entry is None:

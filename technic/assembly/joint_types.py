@@ -2,7 +2,11 @@
 
 The order of the six is [axial, shear, shear, spin, tilt, tilt] in the joint's own axes: the first axis
 is the line of a hinge, slider or cylindrical joint and the normal of a planar joint. For a universal
-joint it is the common normal of its two axes, about which it holds the rotation.
+joint it is the common normal of its two axes, about which it holds the rotation. A slot is a hinge whose
+pin can also slide across: the first axis is the pin's line, the second the direction of the slot.
+
+In two dimensions only the motions in the plane z = 0 remain: a hinge about z holds both shears, a slider
+along a line in the plane holds one shear and one tilt, a ball joint does what a hinge does.
 """
 
 from __future__ import annotations
@@ -25,6 +29,7 @@ class JointType(StrEnum):
     BALL = "ball"
     UNIVERSAL = "universal"
     PLANAR = "planar"
+    SLOT = "slot"
 
 
 HELD: Final[dict[JointType, tuple[bool, bool, bool, bool, bool, bool]]] = {
@@ -35,5 +40,6 @@ HELD: Final[dict[JointType, tuple[bool, bool, bool, bool, bool, bool]]] = {
     JointType.BALL: (True, True, True, False, False, False),
     JointType.UNIVERSAL: (True, True, True, True, False, False),
     JointType.PLANAR: (True, False, False, False, True, True),
+    JointType.SLOT: (True, False, True, False, True, True),
 }
 """Held motions of each type in three dimensions."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -71,6 +72,8 @@ class Part:
     source : Source or None
     definition : PartDefinition or None
         None for shapes of an assembly file.
+    shape : mapping
+        Shape of an assembly file, in part coordinates; empty for parts of a catalogue.
     """
 
     id: str
@@ -84,6 +87,7 @@ class Part:
     color: int | None = None
     source: Source | None = None
     definition: PartDefinition | None = None
+    shape: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def centroid(self) -> Array:

@@ -22,6 +22,7 @@ from technic.commands.options import (
     QuietOption,
     RequireRigidOption,
 )
+from technic.errors import UsageError
 
 if TYPE_CHECKING:
     from technic.rigidity.result import RigidityReport
@@ -61,6 +62,15 @@ def _demands(report: RigidityReport, options: AnalysisOptions) -> list[str]:
     return missed
 
 
+def _reading(model: Path, options: AnalysisOptions) -> dict[str, str]:
+    """Return the options of the reader: an assembly file says itself what its joints hold."""
+    if model.suffix.lower() != ".json":
+        return {"axle_slide": options.axle_slide}
+    if options.axle_slide != "held":
+        raise UsageError("--axle-slide is for LDraw models; an assembly file types its joints")
+    return {}
+
+
 def run(model: Path, options: AnalysisOptions) -> None:
     """Load, analyze and report, as `technic analyze` and `technic demo` do.
 
@@ -84,7 +94,7 @@ def run(model: Path, options: AnalysisOptions) -> None:
         # The drawing program starts while the analysis runs.
         painter = Painter()
     try:
-        assembly = load(model, axle_slide=options.axle_slide)
+        assembly = load(model, **_reading(model, options))
         if options.fix:
             supports = tuple(parse_fix(assembly, text) for text in options.fix)
             assembly = replace(assembly, supports=assembly.supports + supports)
@@ -116,7 +126,10 @@ def run(model: Path, options: AnalysisOptions) -> None:
 
 
 def analyze(
-    model: Annotated[Path, typer.Argument(metavar="MODEL", help="LDraw file (.ldr, .mpd).")],
+    model: Annotated[
+        Path,
+        typer.Argument(metavar="MODEL", help="LDraw file (.ldr, .mpd) or assembly file (.json)."),
+    ],
     json: JsonOption = None,
     picture: PictureOption = None,
     fix: FixOption = None,

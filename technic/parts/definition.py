@@ -11,6 +11,7 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from technic.geometry import Array, readonly
 
@@ -19,11 +20,14 @@ __all__ = [
     "FrameBody",
     "MassProperties",
     "Material",
+    "MeshBody",
     "PartDefinition",
+    "PlateBody",
     "Port",
     "PortKind",
     "RigidBody",
     "Section",
+    "TrussBody",
 ]
 
 
@@ -184,7 +188,80 @@ class FrameBody:
         object.__setattr__(self, "sections", tuple(self.sections))
 
 
-Body = RigidBody | FrameBody
+@dataclass(frozen=True, slots=True, eq=False)
+class TrussBody:
+    """A straight bar that resists stretching only; it cannot bend or twist.
+
+    Parameters
+    ----------
+    points : (2, 3) array_like
+        Its ends (m).
+    area : float
+        Of its section (m2).
+    material : Material
+    """
+
+    points: Array
+    area: float
+    material: Material
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", readonly(self.points))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlateBody:
+    """A flat plate in the plane z = 0 that deforms in its plane (plane stress).
+
+    Parameters
+    ----------
+    outline : (n, 3) array_like
+        Corners of a simple polygon, in order, either way round (m).
+    thickness : float
+        (m)
+    material : Material
+    size : float
+        Edge length of the triangles it is divided into (m).
+    """
+
+    outline: Array
+    thickness: float
+    material: Material
+    size: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "outline", readonly(self.outline))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeshBody:
+    """A body given as a mesh: triangles of a plate in the plane z = 0, or tetrahedra.
+
+    Parameters
+    ----------
+    points : (n, 3) array_like
+        (m)
+    cells : (m, 3) or (m, 4) array_like of int
+        Corners of the triangles or tetrahedra.
+    material : Material
+    thickness : float
+        Of a mesh of triangles (m); 0 for tetrahedra.
+    quadratic : bool
+        True for displacements that are quadratic in every cell, False for linear ones.
+    """
+
+    points: Array
+    cells: NDArray[np.int64]
+    material: Material
+    thickness: float = 0.0
+    quadratic: bool = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", readonly(self.points))
+        object.__setattr__(self, "cells", readonly(self.cells, dtype=np.int64))
+
+
+Body = RigidBody | FrameBody | TrussBody | PlateBody | MeshBody
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -57,10 +57,10 @@ def sort_motions(kin: Kinematics, motions: ComponentMotions, component: int) -> 
     grounded = motions.rigid == 0
     local: list[tuple[MotionKind, Cluster, LocalMotion]] = []
     for n, cluster in enumerate(clusters):
-        if n == 0 and not grounded:
-            continue
         for motion in cluster.local:
             kind = _local_kind(kin, cluster, motion)
+            if n == 0 and not grounded and kind is not MotionKind.IDLE:
+                continue  # the main body stands still, unless it is a rod that turns about itself
             if kind is not MotionKind.STRUCTURAL:
                 local.append((kind, cluster, motion))
     structural = _structural(kin, motions, clusters, local, grounded)
@@ -140,11 +140,15 @@ def _structural(
     own = {id(c): n for n, c in enumerate(clusters)}
     flat = field[bodies].reshape(6 * len(bodies), -1)
     flat = flat[:, np.abs(flat).max(axis=0) > 0.0]
-    removed = [
-        _embed(bodies.index(own[id(c)]), len(bodies), m.twist)
-        for _, c, m in local
-        if not c.fasteners_only
-    ]
+    removed = []
+    for _, c, m in local:
+        n = own[id(c)]
+        if n == 0 and not grounded:  # seen from the main body everything else turns
+            main = _as_one_body(kin, clusters, m.twist[:, None])[bodies, :, 0]
+            main[bodies.index(0)] = 0.0
+            removed.append(main.ravel())
+        elif not c.fasteners_only:
+            removed.append(_embed(bodies.index(n), len(bodies), m.twist))
     if removed:
         q, _ = np.linalg.qr(np.array(removed).T)
         flat = flat - q @ (q.T @ flat)

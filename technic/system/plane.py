@@ -10,7 +10,7 @@ from technic.fem.element import Element
 
 __all__ = ["check_plane", "in_plane"]
 
-PLANE = [0, 1, 5]
+PLANE = np.array([0, 1, 5])
 """Motions of a twist that stay in the plane z = 0."""
 
 FLAT = 1e-9
