@@ -170,7 +170,7 @@ class Sheet:
             near = [k for k, spot in enumerate(spots) if np.hypot(spot[0] - x, spot[1] - y) < 34]
             if near:
                 old = spots[near[0]]
-                spots[near[0]] = (old[0], old[1], f"{old[2]},{marker.text}")
+                spots[near[0]] = (old[0], old[1], f"{old[2]}, {marker.text}")
             else:
                 spots.append((x, y, marker.text))
         for x, y, text in spots:

@@ -53,6 +53,9 @@ _FAINT = 0.25
 
 _SPOTS = 3
 
+_NAMED = 24
+"""More port names than this would hide the part."""
+
 _WHOLE_ASPECT, _HALF_ASPECT = 1.9, 1.0
 """Width over height, about, of a panel that is alone and of one of two."""
 
@@ -272,8 +275,7 @@ def _elastic_panel(
         LegendItem(
             "none",
             OUTLINE,
-            f"deformation drawn {scale:g} times as large as 1 N makes it "
-            f"(furthest point: {number(furthest / MM)} mm)",
+            f"deformation drawn {scale:g} x; 1 N moves the furthest point {number(furthest / MM)} mm",
         ),
     ]
     if arrows is not None:
@@ -362,7 +364,12 @@ def part_scene(definition: PartDefinition) -> Scene:
     ]
     surfaces = (body, merge(ports, on_top=True)) if ports else (body,)
     toward = view_direction(solid.points)
-    panel = Panel("", surfaces, (edges,), fit(np.concatenate([s.points for s in surfaces]), toward))
+    names = tuple(
+        Marker(port.position - 0.5 * port.length * port.axis, port.name)
+        for port in definition.ports
+    )
+    camera = fit(np.concatenate([s.points for s in surfaces]), toward)
+    panel = Panel("", surfaces, (edges,), camera, names if len(names) <= _NAMED else ())
     legend = [
         LegendItem("arrow", MOTION_COLOR, f"{count(len(definition.ports), 'port')}, their axes")
     ]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from math import inf
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +34,9 @@ _HARMLESS_SHOWN = 5
 _SPOTS_SHOWN = 5
 _FINDINGS_SHOWN = 3
 """Longer lists are in the JSON report; a person acts on the first few."""
+
+_SENTENCE = 320
+"""Letters of a motion's sentence: in a big mechanism dozens of parts follow one another."""
 
 _PUSHED = 0.5
 """Parts that go at least this share of the furthest way are named in the softest direction."""
@@ -119,8 +124,14 @@ def _sentence(report: RigidityReport, motion: Motion) -> str:
     said = motion.sentence or (
         f"{part_names(report.assembly, motion.parts)} can move ({motion.type.value})"
     )
+    clauses = said.rstrip(".").split("; ")
+    kept = 1
+    while kept < len(clauses) and len("; ".join(clauses[: kept + 1])) <= _SENTENCE:
+        kept += 1
+    if kept < len(clauses):
+        clauses[kept:] = ["and others with them, see --json"]
     order = _ORDERS.get(motion.order or "")
-    return f"{said.rstrip('.')}" + (f" ({order})." if order else ".")
+    return "; ".join(clauses) + (f" ({order})." if order else ".")
 
 
 def _motions(report: RigidityReport, style: Style) -> list[str]:
@@ -293,24 +304,42 @@ def _assumptions(report: RigidityReport, style: Style) -> list[str]:
         lines += ["", style("bold", "Not modelled")]
         for item in report.not_modelled:
             lines += style.wrap(item, "   - ", "     ")
-    entries = joint_stiffness(report.assembly)
+    entries = _merged(joint_stiffness(report.assembly))
     if entries:
         lines += ["", style("bold", "Joints and where their stiffness comes from")]
-    for entry in entries:
+    for (name, kind, source), (total, values) in entries.items():
         said = []
-        for key, value in entry["values"].items():
+        for key, numbers in values.items():
             motion, _, unit = key.partition("_")
-            values = value if isinstance(value, list) else [value]
-            amount = " to ".join(v if isinstance(v, str) else number(v) for v in values)
-            said.append(f"{motion} {amount}" + ("" if amount == "rigid" else f" {_UNITS[unit]}"))
-        name = entry["connection"] or entry["type"]
+            low, high = min(numbers), max(numbers)
+            amount = number(low) if low == high else f"{number(low)} to {number(high)}"
+            said.append(f"{motion} rigid" if low == inf else f"{motion} {amount} {_UNITS[unit]}")
         lines += style.wrap(
-            f"{entry['count']} x {name} ({entry['type']}): {', '.join(said)}; "
-            f"source: {entry['provenance'] or 'not stated'}",
-            "   ",
-            "      ",
+            f"{total} x {name} ({kind}): {', '.join(said)}; source: {source}", "   ", "      "
         )
     return lines
+
+
+def _merged(
+    entries: list[dict[str, Any]],
+) -> dict[tuple[str, str, str], tuple[int, dict[str, list[float]]]]:
+    """Return the joints by connection, type and source, with all values that occur.
+
+    Joints of several studs have a stiffness each; a reader wants the range.
+    """
+    merged: dict[tuple[str, str, str], tuple[int, dict[str, list[float]]]] = {}
+    for entry in entries:
+        key = (
+            entry["connection"] or entry["type"],
+            entry["type"],
+            entry["provenance"] or "not stated",
+        )
+        total, values = merged.get(key, (0, {}))
+        for motion, value in entry["values"].items():
+            found = value if isinstance(value, list) else [value]
+            values.setdefault(motion, []).extend(inf if v == "rigid" else v for v in found)
+        merged[key] = (total + entry["count"], values)
+    return merged
 
 
 def to_text(report: RigidityReport, style: Style | None = None) -> str:
