@@ -64,14 +64,13 @@ def _bores(definition: PartDefinition) -> tuple[Bore, ...]:
         middle, half = port.position / LDU, port.axis * (port.length / LDU / 2)
         bore = Bore(port.name, port.kind is PortKind.AXLE_HOLE, middle - half, middle + half)
         for k, other in enumerate(whole):
-            if other.cross == bore.cross and np.linalg.norm(other.end - bore.start) < _SAME:
-                if abs(other.axis @ bore.axis) > 1.0 - _SAME:
-                    whole[k] = Bore(other.name, other.cross, other.start, bore.end)
-                    break
-            if other.cross == bore.cross and np.linalg.norm(other.start - bore.end) < _SAME:
-                if abs(other.axis @ bore.axis) > 1.0 - _SAME:
-                    whole[k] = Bore(other.name, other.cross, bore.start, other.end)
-                    break
+            in_line = abs(other.axis @ bore.axis) > 1.0 - _SAME and other.cross == bore.cross
+            if in_line and np.linalg.norm(other.end - bore.start) < _SAME:
+                whole[k] = Bore(other.name, other.cross, other.start, bore.end)
+                break
+            if in_line and np.linalg.norm(other.start - bore.end) < _SAME:
+                whole[k] = Bore(other.name, other.cross, bore.start, other.end)
+                break
         else:
             whole.append(bore)
     return tuple(whole)

@@ -40,17 +40,22 @@ def _studs(bench: Bench, table: Mapping[str, Any]) -> Manifold:
     return kernel.union(solids)
 
 
+def _hollow(low: Array, high: Array, wall: float, top: float) -> Manifold:
+    """Return a box that is open below."""
+    inner, outer = np.array([wall, top, wall]), np.array([-wall, 1.0, -wall])
+    return kernel.box(low, high) - kernel.box(low + inner, high + outer)
+
+
 @feature("shell")
-def _shell(bench: Bench, table: Mapping[str, Any]) -> Manifold:
+def _shell(_bench: Bench, table: Mapping[str, Any]) -> Manifold:
     """A box ``min`` ``max``, open below: ``wall`` thick at the sides, ``top`` thick above (y is down)."""
     low, high = np.array(table["min"], float), np.array(table["max"], float)
     wall, top = table.get("wall", 4.0), table.get("top", 4.0)
-    inside = kernel.box(low + (wall, top, wall), high + (-wall, 1.0, -wall))
-    return kernel.box(low, high) - inside
+    return _hollow(low, high, wall, top)
 
 
 @feature("rail")
-def _rail(bench: Bench, table: Mapping[str, Any]) -> Manifold:
+def _rail(_bench: Bench, table: Mapping[str, Any]) -> Manifold:
     """An I-shaped rail ``from`` ``to``: two plates square to ``normal``, joined by a web.
 
     ``half``: distance of the outer faces from the middle (default 10); ``plate``: thickness of the
@@ -71,7 +76,31 @@ def _rail(bench: Bench, table: Mapping[str, Any]) -> Manifold:
 
 
 @feature("casing")
-def _casing(bench: Bench, table: Mapping[str, Any]) -> Manifold:
+def _casing(_bench: Bench, table: Mapping[str, Any]) -> Manifold:
     """A closed hollow box ``min`` ``max`` with walls ``wall`` thick."""
     low, high, wall = np.array(table["min"], float), np.array(table["max"], float), table["wall"]
     return kernel.box(low, high) - kernel.box(low + wall, high - wall)
+
+
+@feature("block")
+def _block(bench: Bench, table: Mapping[str, Any]) -> Manifold:
+    """A System brick, plate or tile from its receptors: hollow, with tubes between four studs.
+
+    ``wall`` (default 4) and ``top`` (4): thickness; ``studs``: false for none.
+    """
+    cells = [p for p in bench.definition.ports if p.kind is PortKind.TUBE]
+    places = np.array([p.position for p in cells]) / LDU
+    height = float((places[0] + cells[0].axis * cells[0].length / LDU / 2)[1])
+    low, high = places.min(axis=0) - 10.0, places.max(axis=0) + 10.0
+    low[1], high[1] = 0.0, height
+    wall, top = table.get("wall", 4.0), table.get("top", 4.0)
+    solids = [_hollow(low, high, wall, top)]
+    grid = {(round(float(x)), round(float(z))) for x, _, z in places}
+    for x, z in sorted(grid):
+        foot, head = (x + 10.0, high[1], z + 10.0), (x + 10.0, top, z + 10.0)
+        if {(x + 20, z), (x, z + 20), (x + 20, z + 20)} <= grid:
+            tube = kernel.cylinder(head, foot, 8.0, bench.segments)
+            solids.append(tube - kernel.cylinder(head, foot, 6.0, bench.segments))
+    if table.get("studs", True):
+        solids.append(_studs(bench, {}))
+    return kernel.union(solids)

@@ -15,7 +15,7 @@ __all__: list[str] = []
 
 
 @feature("gear")
-def _gear(bench: Bench, table: Mapping[str, Any]) -> Manifold:
+def _gear(_bench: Bench, table: Mapping[str, Any]) -> Manifold:
     """A toothed disc about ``axis`` (default z): ``teeth``, ``outer``, ``root`` radius, ``span``.
 
     ``land``: share of the pitch that a tooth takes at its tip (default 0.2); ``foot``: at its root

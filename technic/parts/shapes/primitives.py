@@ -7,11 +7,13 @@ Each takes the parameters of one entry of a shape table (LDU). The entries ``mir
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from manifold3d import CrossSection, JoinType, Manifold
+from manifold3d import CrossSection, JoinType, Manifold, OpType
 
+from technic.geometry import Array
 from technic.parts.shapes import kernel
 from technic.parts.shapes.bench import Bench, feature
 
@@ -22,7 +24,7 @@ Table = Mapping[str, Any]
 
 
 @feature("box")
-def _box(bench: Bench, table: Table) -> Manifold:
+def _box(_bench: Bench, table: Table) -> Manifold:
     """``min``, ``max``: opposite corners."""
     return kernel.box(table["min"], table["max"])
 
@@ -45,17 +47,16 @@ def _sphere(bench: Bench, table: Table) -> Manifold:
 
 def outline_figure(bench: Bench, table: Table) -> CrossSection:
     """Return the plane figure of ``outline`` points (or ``circle`` [u, v, r], or ``path`` with ``r``),
-    grown by ``round``."""
+    grown by ``round``.
+    """
     if "circle" in table:
         u, v, r = table["circle"]
         return kernel.polygon(kernel.circle_points(r, bench.segments, (u, v)))
     if "path" in table:
         points = np.asarray(table["path"], dtype=float)
         discs = [CrossSection.circle(table["r"], bench.segments).translate(p) for p in points]
-        pieces = [
-            CrossSection.batch_hull([a, b]) for a, b in zip(discs, discs[1:], strict=False)
-        ] or discs
-        return CrossSection.batch_boolean(pieces, kernel.OpType.Add)
+        pieces = [CrossSection.batch_hull([a, b]) for a, b in pairwise(discs)] or discs
+        return CrossSection.batch_boolean(pieces, OpType.Add)
     figure = kernel.polygon(table["outline"])
     grow = table.get("round", 0.0)
     if grow:
@@ -80,7 +81,7 @@ def _revolve(bench: Bench, table: Table) -> Manifold:
 
 
 @feature("cross")
-def _cross(bench: Bench, table: Table) -> Manifold:
+def _cross(_bench: Bench, table: Table) -> Manifold:
     """An axle's cross section swept ``from`` ``to``; ``across``: where an arm points."""
     figure = kernel.polygon(kernel.axle_outline(table.get("r", 6.0), table.get("arm", 2.0)))
     return kernel.prism(figure, table["from"], table["to"], table.get("across"))
@@ -96,7 +97,7 @@ def _pin_bore(bench: Bench, table: Table) -> Manifold:
 
 
 @feature("axle_bore")
-def _axle_bore(bench: Bench, table: Table) -> Manifold:
+def _axle_bore(_bench: Bench, table: Table) -> Manifold:
     """The cutter of an axle hole ``from`` ``to``; ``across``: where an arm points."""
     return kernel.cross_bore(table["from"], table["to"], table.get("across"))
 
@@ -109,4 +110,38 @@ def _stud(bench: Bench, table: Table) -> Manifold:
     body = kernel.cylinder((x, y, z), top, 6.0, bench.segments)
     if "hollow" in table:
         body -= kernel.cylinder((x, y, z), top, table["hollow"], bench.segments)
+    return body
+
+
+_DIRECTIONS = np.array(
+    [
+        (x, y, z)
+        for x in (-1, 0, 1)
+        for y in (-1, 0, 1)
+        for z in (-1, 0, 1)
+        if (x, y, z) != (0, 0, 0)
+    ],
+    dtype=float,
+)
+_DIRECTIONS /= np.linalg.norm(_DIRECTIONS, axis=1)[:, None]
+
+
+@feature("extents")
+def _extents(_bench: Bench, table: Table) -> Manifold:
+    """A shell with flat faces: ``reach``, its extents in 26 directions, ``wall``, its thickness.
+
+    The directions are those of the neighbours of a cube in a grid of cubes, x slowest.
+    """
+    reach = np.asarray(table["reach"], dtype=float)
+    outer = _trimmed(reach)
+    inner = _trimmed(reach - table["wall"])
+    return outer if inner.is_empty() else outer - inner
+
+
+def _trimmed(reach: Array) -> Manifold:
+    """Return what lies within `reach` of the origin in every direction."""
+    size = 10.0 * (1.0 + float(np.abs(reach).max()))
+    body = kernel.box((-size,) * 3, (size,) * 3)
+    for direction, distance in zip(_DIRECTIONS, reach, strict=True):
+        body = body.trim_by_plane(tuple((-direction).tolist()), -float(distance))
     return body

@@ -1,0 +1,151 @@
+"""Shapes are closed, and their volumes are those of the LDraw surfaces."""
+
+from __future__ import annotations
+
+import functools
+import json
+import re
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from technic.errors import SchemaError, UsageError
+from technic.fem.solid.inside import fill_fractions
+from technic.ldraw.library import Library
+from technic.ldraw.triangles import surface_of
+from technic.parts.catalogue import catalogue
+from technic.parts.definition import PartDefinition
+from technic.parts.shapes import has_shape, mesh
+from technic.parts.shapes.kernel import area_radius, axle_outline, circle_points
+from technic.units import LDU
+
+HERE = Path(__file__).parent
+MEASURED = json.loads((HERE / "ldraw_volumes.json").read_text(encoding="utf-8"))
+"""Volume (mm3) that the LDraw surface of a part encloses."""
+
+EXACT = re.compile(r"beam|frame|^pin|^axle|bush|connector|cross-block|joiner")
+"""Families whose volume must be right within 2 %; all others within 10 %."""
+
+SAMPLE = ("32524", "32140", "2780", "3705", "6536", "32013", "64179", "3701")
+
+
+@functools.cache
+def listed_differences() -> dict[str, float]:
+    """Differences in percent that docs/shape_differences.md lists, by part."""
+    page = HERE.parents[1] / "docs" / "shape_differences.md"
+    rows = re.findall(r"^\| (\S+) \|[^|]*\| ([+-]\d+\.\d) \|", page.read_text("utf-8"), re.M)
+    return {part: float(percent) for part, percent in rows}
+
+
+def definition(part: str) -> PartDefinition:
+    found = catalogue().get(part)
+    assert found is not None, part
+    return found
+
+
+@pytest.mark.parametrize("part", catalogue().ids())
+def test_every_definition_has_a_closed_shape_of_the_right_volume(part: str) -> None:
+    shape = mesh(definition(part), "solid")
+    assert shape.is_watertight
+    assert shape.is_winding_consistent
+    volume = shape.volume * 1e9
+    assert volume > 0.0
+    if part in MEASURED["volume_mm3"]:
+        percent = 100.0 * (volume / MEASURED["volume_mm3"][part] - 1.0)
+        expected = listed_differences().get(part)
+        if expected is None:
+            assert abs(percent) <= (2.0 if EXACT.search(definition(part).family) else 10.0)
+        else:
+            assert percent == pytest.approx(expected, abs=0.3)
+
+
+@pytest.mark.parametrize("part", ["32524", "2780", "3705", "6536", "3701", "3648b"])
+def test_drawn_shape_is_closed_and_light(part: str) -> None:
+    drawn, solid = mesh(definition(part)), mesh(definition(part), "solid")
+    assert drawn.is_watertight
+    assert len(drawn.faces) < len(solid.faces)
+    assert drawn.volume == pytest.approx(solid.volume, rel=0.03)
+    assert np.allclose(drawn.bounds, solid.bounds, atol=0.3 * LDU)
+
+
+def test_liftarm_has_pockets_counterbores_and_bores() -> None:
+    """Material is where LDraw's 32524 has it: web, rims, walls; and is missing in the pockets."""
+    shape = mesh(definition("32524"), "solid")
+    inside = {
+        "web between holes": (0, 0, 10),
+        "side wall": (7.5, 6, 10),
+        "rim around a hole": (7, 5, 0),
+    }
+    outside = {
+        "pocket": (0, 4, 10),
+        "pocket on the other face": (0, -4, 10),
+        "bore": (0, 0, 0),
+        "counterbore": (7, 9, 0),
+        "beyond the face": (8.5, 10.5, 10),
+    }
+    points = np.array([*inside.values(), *outside.values()], dtype=float) * LDU
+    assert shape.contains(points).tolist() == [True] * len(inside) + [False] * len(outside)
+
+
+def test_bounds_of_a_liftarm_are_its_nominal_ones() -> None:
+    assert np.allclose(
+        mesh(definition("32316"), "solid").bounds / LDU, [[-9, -10, -49], [9, 10, 49]], atol=1e-6
+    )
+
+
+def test_polygons_have_the_area_of_the_circle() -> None:
+    x, y = circle_points(3.0, 20).T
+    area = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+    assert area == pytest.approx(np.pi * 9.0)
+    assert area_radius(48) == pytest.approx(1.0, abs=2e-3)
+
+
+def test_axle_section_agrees_with_the_design_value() -> None:
+    """13.6 mm2 for arms of 1.8 mm by 4.8 mm; LDraw's arms are 1.6 mm thick."""
+    x, y = axle_outline().T
+    area = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) * (LDU * 1e3) ** 2
+    assert area == pytest.approx(4.8 * 1.6 * 2 - 1.6**2, rel=0.06)
+
+
+def test_meshes_are_kept() -> None:
+    assert mesh(definition("32524")) is mesh(definition("32524"))
+
+
+def test_unknown_detail_and_missing_shape_are_told() -> None:
+    part = definition("32524")
+    with pytest.raises(UsageError, match="draw, solid"):
+        mesh(part, "rough")
+    nameless = PartDefinition("none", "None", "none", (), part.body, part.mass_properties)
+    assert not has_shape(nameless)
+    with pytest.raises(SchemaError, match="has no shape"):
+        mesh(nameless)
+
+
+@pytest.mark.speed
+def test_a_beam_is_drawn_fast() -> None:
+    part = definition("32523")
+    mesh.cache_clear()
+    start = time.process_time()
+    mesh(part)
+    assert time.process_time() - start < 0.2
+
+
+@functools.cache
+def _library(path: Path) -> Library:
+    return Library.open(path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", SAMPLE)
+def test_measured_volumes_can_be_measured_again(part: str, ldraw_library: Path) -> None:
+    surface = surface_of(_library(ldraw_library), part)
+    assert surface is not None
+    triangles = np.asarray(surface.triangles)
+    size = 0.5 * LDU
+    low = triangles.min(axis=(0, 1)) - 3 * size
+    shape = np.ceil((triangles.max(axis=(0, 1)) + 3 * size - low) / size).astype(int)
+    filling = fill_fractions(triangles, low, size, (int(shape[0]), int(shape[1]), int(shape[2])))
+    volume = filling.fraction.sum() * (size * 1e3) ** 3
+    assert volume == pytest.approx(MEASURED["volume_mm3"][part], rel=0.03)
