@@ -131,8 +131,9 @@ class ShadowLibrary:
             return data.decode("latin-1")
 
     def has(self, key: str) -> bool:
-        """Tell whether there is a shadow of the library file at `key` itself."""
-        return key.removeprefix("unofficial/") in self.store
+        """Tell whether there are snap lines for the library file at `key` itself."""
+        text = self.text(key)
+        return text is not None and "SNAP_" in text.upper()
 
     def where(self, key: str) -> str:
         """Return how a message names the shadow of the file at `key`."""
@@ -272,7 +273,12 @@ def _included(
     """Yield the snaps that an include line brings: those of one shadow file, placed."""
     if depth > MAX_DEPTH:
         raise ValueError("includes nest too deep")
-    name = reference_key(options.get("ref", ""))
+    try:
+        name = reference_key(options.get("ref", ""))
+    except InputError as error:
+        raise ValueError(error.message) from None
+    if not name:
+        raise ValueError("ref names no file")
     target = library.find(name)
     keys = [target] if target else [folder + name for folder in ("parts/", "p/")]
     inner: list[Snap] = []

@@ -52,11 +52,8 @@ def features_from_shadow(
     key = library.key_of(number)
     if key is None or not describes(library, shadow, key):
         return None
-    snaps = snaps_of(shadow, library, key)
-    if not snaps:
-        return None
     pieces: list[Piece] = []
-    for snap in snaps:
+    for snap in snaps_of(shadow, library, key):
         pieces += pieces_of(snap)
     return build_features(pieces)
 

@@ -70,7 +70,9 @@ class Surface:
 
     @property
     def bounds(self) -> Array:
-        """Lowest and highest coordinates, (2, 3) (m)."""
+        """Lowest and highest coordinates, (2, 3) (m); zeros when there is no triangle."""
+        if not len(self.triangles):
+            return np.zeros((2, 3))
         corners = self.triangles.reshape(-1, 3)
         return np.array([corners.min(axis=0), corners.max(axis=0)])
 
