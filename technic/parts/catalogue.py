@@ -34,6 +34,9 @@ __all__ = ["Catalogue", "catalogue", "read_rows"]
 _DECORATED = re.compile(r"^(\d+[a-z]?)(?:p|d)[a-z0-9]+$")
 """A printed (pNN) or stickered (dNN) version of a part has the part's geometry."""
 
+_EMBEDDED = re.compile(r"^[\d-]+ - (?=\d)")
+"""Models of the Official Model Repository embed parts as ``<set> - <part>.dat``."""
+
 _IDENTITY = Pose.identity()
 
 
@@ -102,7 +105,8 @@ class Catalogue:
         Parameters
         ----------
         number : str
-            With or without ``.dat``, any case; an id, an alias, a moved id or a decorated version.
+            With or without ``.dat``, any case; an id, an alias, a moved id, a decorated version,
+            or a part embedded in a model (``"8002 - 33299a"``).
         """
         name = self._find(number)
         return None if name is None else self._definition(name.part)
@@ -120,7 +124,7 @@ class Catalogue:
         return self._definition(name.part), pose
 
     def _find(self, number: str) -> _Name | None:
-        key = number.strip().lower().removesuffix(".dat")
+        key = _EMBEDDED.sub("", number.strip().lower().removesuffix(".dat"))
         found = self._names.get(key)
         if found is None and (match := _DECORATED.match(key)):
             found = self._names.get(match[1])

@@ -165,6 +165,7 @@ def test_straight_beams_have_the_length_of_the_reference_list(
         ("4265B.DAT", "6577"),
         ("3649p01", "3649"),
         ("32556", "32556a"),
+        ("8002 - 33299a.dat", "33299a"),
     ],
 )
 def test_variants_and_moved_numbers_resolve(number: str, part: str) -> None:
@@ -188,6 +189,7 @@ def test_unknown_numbers_give_none() -> None:
     parts = catalogue()
     assert parts.get("no-such-part") is None
     assert parts.resolve("0") is None
+    assert parts.get("42020-1 - sticker rescue left.dat") is None
     assert "32524" in parts
     assert "999999" not in parts
 
