@@ -120,8 +120,23 @@ def _joint(
         type_ = JointType.FIXED if axle_slide == "held" else JointType.SLIDER
     elif mating.connection == "axle/pin_hole":
         type_ = JointType.CYLINDRICAL if missing else JointType.HINGE
-    axes = _axes(*mating.axis)
-    return _build(placed, mating, entry, type_, entry.vector(), joint_id, axes, missing)
+    point, axis = _shaft_line(placed, mating)
+    axes = _axes(*axis)
+    return _build(placed, mating, entry, type_, entry.vector(), joint_id, axes, missing, point)
+
+
+def _shaft_line(placed: PlacedPorts, mating: Mating) -> tuple[Array, Array]:
+    """Return the joint's point and axis: on the shaft's line when a shaft sits in a bore.
+
+    A pin turns in all its bores about one line, its own. Files place parts a little off; taking each
+    bore's line instead would make a crank of every pin that is not placed perfectly.
+    """
+    if not mating.connection.startswith(("pin/", "axle/")):
+        return mating.point, mating.axis
+    axis = placed.axis[mating.male]
+    foot = placed.position[mating.male]
+    point = foot + ((mating.point - foot) @ axis) * axis
+    return point, axis if axis @ mating.axis > 0.0 else -axis
 
 
 def _studs(
