@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TypeVar
 
 HEADER = "0 {title}\r\n0 Name: {name}\r\n0 !LDRAW_ORG Part UPDATE 2026-02\r\n0 BFC CERTIFY CCW\r\n"
 
@@ -18,6 +19,15 @@ PRIMITIVES = (
     "connect",
     "confric",
 )
+
+
+T = TypeVar("T")
+
+
+def there(found: T | None) -> T:
+    """What was looked up, which must exist."""
+    assert found is not None
+    return found
 
 
 def line(name: str, at=(0, 0, 0), matrix=(1, 0, 0, 0, 1, 0, 0, 0, 1)) -> str:

@@ -13,7 +13,7 @@ from technic.errors import InputError, MissingDependency
 from technic.ldraw.library import Library, candidate_folders, find_library, reference_key
 from technic.ldraw.primitives import ports_from_primitives
 from technic.ldraw.storage import ZipStore, cache_folder
-from tests.ldraw.small_library import files_with, line, part, write_folder, write_zip
+from tests.ldraw.small_library import files_with, line, part, there, write_folder, write_zip
 
 
 @pytest.fixture(autouse=True)
@@ -50,8 +50,8 @@ def test_unofficial_parts_come_after_official_ones(tmp_path):
     official = write_zip(tmp_path / "complete.zip", FILES, "ldraw/")
     unofficial = {"parts/1.dat": part(title="Changed"), "parts/2.dat": part(title="New")}
     library = Library.open(official, write_zip(tmp_path / "ldrawunf.zip", unofficial))
-    assert library.file(library.key_of("1")).title == "Brick"
-    assert library.file(library.key_of("2")).title == "New"
+    assert library.file(there(library.key_of("1"))).title == "Brick"
+    assert library.file(there(library.key_of("2"))).title == "New"
     inside = {**FILES, "unofficial/parts/3.dat": part(title="Inside")}
     assert Library.open(write_folder(tmp_path / "both", inside)).key_of("3") == (
         "unofficial/parts/3.dat"
@@ -76,17 +76,17 @@ def test_moved_stubs_are_followed_with_their_transform(tmp_path):
         "parts/9.dat": part(line("1a.dat"), title="=Beam"),
     }
     library = Library.open(write_folder(tmp_path / "l", files))
-    found = library.resolve("1c")
+    found = there(library.resolve("1c"))
     assert (found.key, found.via) == ("parts/1a.dat", ("parts/1c.dat", "parts/1b.dat"))
     np.testing.assert_allclose(found.matrix, np.reshape(turn, (3, 3)))
     np.testing.assert_allclose(found.offset, [5, 0, 20])
-    assert library.resolve("9").key == "parts/9.dat"  # an alias is a part like any other
-    assert len(ports_from_primitives(library, "9")) == 1
+    assert there(library.resolve("9")).key == "parts/9.dat"  # an alias is a part like any other
+    assert len(there(ports_from_primitives(library, "9"))) == 1
     assert library.resolve("77") is None
 
 
 def test_the_frame_that_turned_when_it_moved(shared_library):
-    found = shared_library.resolve("32531")
+    found = there(shared_library.resolve("32531"))
     assert found.key == "parts/32531a.dat"
     np.testing.assert_allclose(found.matrix, [[0, 0, -1], [0, 1, 0], [1, 0, 0]])
 
@@ -107,7 +107,7 @@ def test_stubs_in_a_circle_are_refused(tmp_path):
     }
     library = Library.open(write_folder(tmp_path / "l", files))
     with pytest.raises(InputError, match=r"circle: parts/5\.dat -> parts/6\.dat -> parts/5\.dat"):
-        library.resolve("5")
+        there(library.resolve("5"))
 
 
 @pytest.mark.parametrize("name", ["/etc/passwd", "..\\x.dat", "s/../../x.dat", "C:\\x.dat", "a\0b"])
@@ -141,7 +141,7 @@ def test_a_file_that_includes_itself_is_refused(tmp_path):
     }
     library = Library.open(write_folder(tmp_path / "l", files))
     with pytest.raises(InputError, match=r"includes itself: parts/2\.dat -> parts/s/2s01\.dat"):
-        ports_from_primitives(library, "2")
+        there(ports_from_primitives(library, "2"))
 
 
 # --- damaged and hostile zips -----------------------------------------------------------------
@@ -250,14 +250,14 @@ def test_search_order(tmp_path, monkeypatch):
     home = candidate_folders()[0]
     assert home == tmp_path / "home" / "ldraw"
     write_folder(home, FILES)
-    assert find_library().path == home
+    assert there(find_library()).path == home
     other = write_folder(tmp_path / "other", FILES)
     monkeypatch.setenv("LDRAWDIR", str(other))
-    assert find_library().path == other
+    assert there(find_library()).path == other
     explicit = write_zip(tmp_path / "l.zip", FILES)
-    assert find_library(explicit).path == explicit
+    assert there(find_library(explicit)).path == explicit
     with pytest.raises(MissingDependency, match="no LDraw parts library at"):
-        find_library(tmp_path / "missing")
+        there(find_library(tmp_path / "missing"))
 
 
 def test_a_zip_in_the_usual_place_is_found(tmp_path, monkeypatch):
@@ -265,7 +265,7 @@ def test_a_zip_in_the_usual_place_is_found(tmp_path, monkeypatch):
     monkeypatch.setenv("USERPROFILE", str(tmp_path))
     (tmp_path / "ldraw").mkdir()
     write_zip(tmp_path / "ldraw" / "complete.zip", FILES, "ldraw/")
-    assert find_library().path.name == "complete.zip"
+    assert there(find_library()).path.name == "complete.zip"
 
 
 def test_the_cache_folder_can_be_named(cache):

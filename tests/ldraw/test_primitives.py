@@ -10,7 +10,7 @@ from technic.ldraw.library import Library
 from technic.ldraw.primitives import ports_from_primitives
 from technic.parts.definition import PortKind
 from technic.units import LDU
-from tests.ldraw.small_library import files_with, line, part, write_folder
+from tests.ldraw.small_library import files_with, line, part, there, write_folder
 
 ALONG_X = (0, 1, 0, 1, 0, 0, 0, 0, 1)
 """Turns a primitive's y into the part's x."""
@@ -42,7 +42,7 @@ def ports(tmp_path, monkeypatch):
         extra = {f"parts/s/{name}.dat": body for name, body in subparts.items()}
         files = files_with({"parts/1.dat": part(*lines), **extra})
         library = Library.open(write_folder(tmp_path / "l", files))
-        return [text(port) for port in ports_from_primitives(library, "1")]
+        return [text(port) for port in there(ports_from_primitives(library, "1"))]
 
     return read
 
@@ -93,11 +93,11 @@ def ports(tmp_path, monkeypatch):
     ],
 )
 def test_known_parts(shared_library, number, expected):
-    assert [text(port) for port in ports_from_primitives(shared_library, number)] == expected
+    assert [text(port) for port in there(ports_from_primitives(shared_library, number))] == expected
 
 
 def test_studs_and_tubes_point_outward(shared_library):
-    found = [text(port) for port in ports_from_primitives(shared_library, "3700")]
+    found = [text(port) for port in there(ports_from_primitives(shared_library, "3700"))]
     assert found == [
         "hole1 (0 10 0) (0 0 1) 20",
         "tube1 (0 21 0) (0 1 0) 6",
@@ -107,7 +107,7 @@ def test_studs_and_tubes_point_outward(shared_library):
 
 
 def test_a_moved_number_keeps_its_own_axes(shared_library):
-    old, new = (ports_from_primitives(shared_library, n) for n in ("32531", "32531a"))
+    old, new = (there(ports_from_primitives(shared_library, n)) for n in ("32531", "32531a"))
     holes = [[p for p in ports if p.kind is PortKind.PIN_HOLE] for ports in (old, new)]
     turn = np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]])
     expected = sorted(tuple((turn @ port.position / LDU).round(3) + 0.0) for port in holes[1])

@@ -15,7 +15,7 @@ from technic.ldraw.shadow import ShadowLibrary, snaps_of
 from technic.ldraw.shadow_ports import ports_from_shadow
 from technic.parts.definition import Port, PortKind
 from technic.units import LDU
-from tests.ldraw.small_library import files_with, line, part, write_folder, write_zip
+from tests.ldraw.small_library import files_with, line, part, there, write_folder, write_zip
 
 
 @pytest.fixture(autouse=True)
@@ -194,7 +194,7 @@ def test_friction_comes_from_the_title(tmp_path):
     library = Library.open(write_folder(tmp_path / "l", files))
     shadow = write_folder(tmp_path / "s", {f"parts/{n}.dat": meta("CYL", PIN) for n in (1, 2)})
     known = ShadowLibrary.open(shadow)
-    rough = [ports_from_shadow(library, known, n)[0].friction for n in ("1", "2")]
+    rough = [there(ports_from_shadow(library, known, n))[0].friction for n in ("1", "2")]
     assert rough == [True, False]
 
 

@@ -15,7 +15,7 @@ from technic.ldraw.triangles import Surface, surface_of
 from technic.parts.definition import RigidBody
 from technic.parts.materials import material
 from technic.units import LDU
-from tests.ldraw.small_library import files_with, line, part, write_folder
+from tests.ldraw.small_library import files_with, line, part, there, write_folder
 
 CORNERS = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
 FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -84,12 +84,12 @@ INVERT = "0 BFC INVERTNEXT\r\n"
 )
 def test_normals_point_outward(library, body, volume):
     known = library(x=body, cube=CUBE, hollow=part(INVERT, line("cube.dat")))
-    assert volume_ldu(surface_of(known, "x")) == pytest.approx(volume)
+    assert volume_ldu(there(surface_of(known, "x"))) == pytest.approx(volume)
 
 
 def test_uncertified_polygons_are_marked(library):
     known = library(x=part(line("cube.dat"), line("old.dat")), cube=CUBE, old=polygons())
-    surface = surface_of(known, "x")
+    surface = there(surface_of(known, "x"))
     assert surface.triangles.shape == (24, 3, 3)
     assert surface.certified.sum() == 12
     assert not surface.triangles.flags.writeable
@@ -99,14 +99,14 @@ def test_a_moved_number_is_turned(library):
     stub = part(line("slab.dat", (0, 0, 5), (0, 0, -1, 0, 1, 0, 1, 0, 0)), title="~Moved to slab")
     slab = part(line("cube.dat", matrix=(5, 0, 0, 0, 1, 0, 0, 0, 1)))
     known = library(x=stub, slab=slab, cube=CUBE)
-    surface = surface_of(known, "x")
+    surface = there(surface_of(known, "x"))
     np.testing.assert_allclose(surface.bounds / LDU, [[-1, -1, 0], [1, 1, 10]], atol=1e-9)
     assert volume_ldu(surface) == pytest.approx(40)
 
 
 def test_missing_subfiles_are_named(library):
     known = library(x=part(line("gone.dat")))
-    empty = surface_of(known, "x")
+    empty = there(surface_of(known, "x"))
     assert empty.missing == ("gone.dat",)
     np.testing.assert_array_equal(empty.bounds, np.zeros((2, 3)))
     assert surface_of(known, "y") is None
@@ -117,21 +117,21 @@ def test_too_many_triangles_are_refused(library, monkeypatch):
     monkeypatch.setattr(triangles, "MAX_TRIANGLES", 50)
     many = part(*[line("cube.dat")] * 5)
     with pytest.raises(InputError, match="more than 50 triangles"):
-        surface_of(library(x=many, cube=CUBE), "x")
+        there(surface_of(library(x=many, cube=CUBE), "x"))
     with pytest.raises(InputError, match="more than 50 triangles"):
-        surface_of(library(x=part(polygons() * 5)), "x")
+        there(surface_of(library(x=part(polygons() * 5)), "x"))
 
 
 def test_a_file_that_includes_itself_is_refused(library):
     known = library(x=part(line("y.dat")), y=part(line("x.dat")))
     with pytest.raises(InputError, match="includes itself"):
-        surface_of(known, "x")
+        there(surface_of(known, "x"))
 
 
 @pytest.mark.parametrize("text", ["3 16 0 0 0 1 1 1 2 2\r\n", "4 16 0 0 0 1 1 1 2 2 2 a b c\r\n"])
 def test_broken_polygons_are_named(library, text):
     with pytest.raises(InputError, match=r"parts/x\.dat:5: a type . line needs"):
-        surface_of(library(x=part(text)), "x")
+        there(surface_of(library(x=part(text)), "x"))
 
 
 # --- integrals --------------------------------------------------------------------------------
@@ -158,7 +158,7 @@ def test_integrals_of_a_turned_box(half, middle, angle):
 
 def test_volume_of_a_beam(shared_library):
     """The 48-sided primitives give a closed surface, and bores nearer to round ones."""
-    coarse, fine = (surface_of(shared_library, "32523", fine=flag) for flag in (False, True))
+    coarse, fine = (there(surface_of(shared_library, "32523", fine=flag)) for flag in (False, True))
     assert fine.integrals().gap < 1e-5
     assert fine.certified.all()
     assert len(fine.triangles) > len(coarse.triangles)
@@ -168,7 +168,7 @@ def test_volume_of_a_beam(shared_library):
 
 # --- definitions ------------------------------------------------------------------------------
 def test_definition_of_a_beam(shared_library):
-    beam = definition_from_library(shared_library, "32523")
+    beam = there(definition_from_library(shared_library, "32523"))
     assert (beam.id, beam.title, beam.family) == ("32523", "Technic Beam 3", "library")
     assert isinstance(beam.body, RigidBody)
     assert [port.name for port in beam.ports] == ["hole1", "hole2", "hole3"]
@@ -188,11 +188,11 @@ def test_definition_of_a_beam(shared_library):
     ],
 )
 def test_fasteners_are_told_from_structure(shared_library, number, fastener):
-    assert definition_from_library(shared_library, number).fastener is fastener
+    assert there(definition_from_library(shared_library, number)).fastener is fastener
 
 
 def test_mass_of_a_cube(library):
-    mass, how = mass_of(surface_of(library(cube=CUBE), "cube"))
+    mass, how = mass_of(there(surface_of(library(cube=CUBE), "cube")))
     expected = material().density * (2 * LDU) ** 3
     assert how == "mass from the surface"
     assert mass.mass == pytest.approx(expected)
@@ -202,15 +202,15 @@ def test_mass_of_a_cube(library):
 def test_mass_of_an_open_surface_is_an_estimate(library):
     """A cube without its last face, and a part that draws nothing."""
     open_cube = part("".join(polygons().splitlines(keepends=True)[:-1]))
-    mass, how = mass_of(surface_of(library(x=open_cube), "x"))
+    mass, how = mass_of(there(surface_of(library(x=open_cube), "x")))
     assert how == "mass estimated from the box"
     box = material().density * (2 * LDU) ** 3
     assert 0.2 * box < mass.mass < 0.5 * box
-    nothing, how = mass_of(surface_of(library(y=part()), "y"))
+    nothing, how = mass_of(there(surface_of(library(y=part()), "y")))
     assert (nothing.mass, how) == (0.0, "no surface, no mass")
 
 
 def test_titles_lose_the_marks_of_the_library(library):
     known = library(a=part(CUBE, title="=Technic  Beam   3"))
-    assert definition_from_library(known, "a.DAT").title == "Technic Beam 3"
+    assert there(definition_from_library(known, "a.DAT")).title == "Technic Beam 3"
     assert definition_from_library(known, "b") is None
