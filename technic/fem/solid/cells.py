@@ -4,6 +4,10 @@ The finite cell method (Parvizian, Düster, Rank 2007; Düster et al. 2008): the
 that need not follow the surface; the integrand of a cell is weighted by the share of each sub-cube
 that is inside the part. For cubes the stiffness of each sub-cube is the same in every cell, so a
 cell's matrix is a weighted sum of matrices that are computed once.
+
+In a sub-cube that the surface cuts, the weights of the Gauss points are chosen so that they have the
+volume and the centroid of the material in it. Volume alone puts the material at the middle of the
+sub-cube, i.e. partly outside the part, and makes parts about 1 % too stiff.
 """
 
 from __future__ import annotations
@@ -21,6 +25,7 @@ __all__ = [
     "CELL_NODES",
     "OFFSETS",
     "elasticity",
+    "gauss_weights",
     "packed_indices",
     "shape_functions",
     "sub_mass",
@@ -64,7 +69,11 @@ def shape_functions(xi: Array) -> tuple[Array, Array]:
     slope = np.where(OFFSETS == 1, -2.0 * xi[:, None, :], node)
     body = np.prod(factor, axis=2)
     others = np.stack(
-        [factor[..., 1] * factor[..., 2], factor[..., 0] * factor[..., 2], factor[..., 0] * factor[..., 1]],
+        [
+            factor[..., 1] * factor[..., 2],
+            factor[..., 0] * factor[..., 2],
+            factor[..., 0] * factor[..., 1],
+        ],
         axis=2,
     )
     gradient = slope * others
@@ -95,23 +104,47 @@ def packed_indices() -> tuple[Array, Array]:
     return np.tril_indices(3 * CELL_NODES)
 
 
-def _sub_points(divisions: int, order: int) -> tuple[Array, Array]:
-    """Return Gauss points of every sub-cube, (divisions**3, order**3, 3), and weights (volume 8)."""
-    abscissae, weights = leggauss(order)
+def gauss_weights(fill: Array, moment: Array) -> Array:
+    """Return weights of the eight Gauss points of sub-cubes that are partly filled.
+
+    The weights sum to the share that is filled, have its centroid and are not negative. A centroid
+    further from the middle than a Gauss point (a sliver at a face) is moved to the Gauss point.
+
+    Parameters
+    ----------
+    fill : (...) ndarray
+        Share inside, 0 to 1.
+    moment : (..., 3) ndarray
+        Share times offset of the centroid from the middle, in edges of the sub-cube.
+
+    Returns
+    -------
+    (..., 8) ndarray
+        Weights relative to the volume of the sub-cube; points ordered as in `sub_stiffness`.
+    """
+    offset = moment / np.maximum(fill, 1e-12)[..., None]
+    along = np.clip(offset * (2.0 * np.sqrt(3.0)), -1.0, 1.0)
+    sides = np.stack([1.0 - along, 1.0 + along], axis=-1) / 2.0
+    weights = np.einsum("...i,...j,...k->...ijk", *(sides[..., axis, :] for axis in range(3)))
+    return np.asarray(fill[..., None] * weights.reshape(*fill.shape, 8))
+
+
+def _gauss_points(divisions: int) -> Array:
+    """Return the Gauss points of every sub-cube in the reference cell, (divisions**3 * 8, 3)."""
+    abscissae, _ = leggauss(2)
     centres = (np.arange(divisions) + 0.5) * 2.0 / divisions - 1.0
     line = centres[:, None] + abscissae / divisions
-    w = weights / divisions
     grid = np.stack(np.meshgrid(*[np.arange(divisions)] * 3, indexing="ij"), -1).reshape(-1, 3)
-    local = np.stack(np.meshgrid(*[np.arange(order)] * 3, indexing="ij"), -1).reshape(-1, 3)
-    points = line[grid[:, None, :], local[None, :, :]]
-    return points, np.prod(w[local], axis=1)
+    local = np.stack(np.meshgrid(*[np.arange(2)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    return line[grid[:, None, :], local[None, :, :]].reshape(-1, 3)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=4)
 def sub_stiffness(divisions: int, size: float, material: Material) -> Array:
-    """Return the share of the cell's stiffness that comes from each sub-cube.
+    """Return what each Gauss point of each sub-cube adds to the cell's stiffness, for weight 1.
 
-    The rule (three points a direction) is exact: the integrand has degree four in each direction.
+    Two points a direction in each sub-cube: exact to degree three in the sub-cube, where the integrand
+    has degree four; the rest is of order ``divisions**-4``.
 
     Parameters
     ----------
@@ -123,42 +156,40 @@ def sub_stiffness(divisions: int, size: float, material: Material) -> Array:
 
     Returns
     -------
-    (divisions**3, 1830) ndarray
+    (divisions**3 * 8, 1830) ndarray
         Lower triangles, packed row by row (N/m); unknowns ordered node by node.
     """
-    points, weights = _sub_points(divisions, 3)
+    points = _gauss_points(divisions)
+    volume = (size / divisions) ** 3
     hooke = elasticity(material)
     rows, columns = packed_indices()
     out = np.empty((len(points), len(rows)))
-    for k, cloud in enumerate(points):
-        _, gradient = shape_functions(cloud)
+    for begin in range(0, len(points), 64):
+        _, gradient = shape_functions(points[begin : begin + 64])
         g = gradient * 2.0 / size
-        strain = np.zeros((len(cloud), 6, CELL_NODES, 3))
+        strain = np.zeros((len(g), 6, CELL_NODES, 3))
         for axis in range(3):
             strain[:, axis, :, axis] = g[:, :, axis]
         for row, (a, b) in enumerate(((1, 2), (2, 0), (0, 1)), start=3):
             strain[:, row, :, a] = g[:, :, b]
             strain[:, row, :, b] = g[:, :, a]
-        b = strain.reshape(len(cloud), 6, -1)
-        scaled = weights[:, None, None] * (size / 2.0) ** 3 * (hooke @ b)
-        matrix = np.einsum("kia,kib->ab", b, scaled, optimize=True)
-        out[k] = matrix[rows, columns]
+        flat = strain.reshape(len(g), 6, -1)
+        matrix = volume * (flat.transpose(0, 2, 1) @ (hooke @ flat))
+        out[begin : begin + 64] = matrix[:, rows, columns]
     out.setflags(write=False)
     return out
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=4)
 def sub_mass(divisions: int, size: float) -> Array:
-    """Return the share of the cell's mass matrix that comes from each sub-cube, for density 1.
+    """Return what each Gauss point adds to the cell's mass matrix, for weight and density 1.
 
     Returns
     -------
-    (divisions**3, 20, 20) ndarray
+    (divisions**3 * 8, 20, 20) ndarray
         In m3; one direction of displacement.
     """
-    points, weights = _sub_points(divisions, 4)
-    values, _ = shape_functions(points.reshape(-1, 3))
-    n = values.reshape(*points.shape[:2], CELL_NODES)
-    out = np.einsum("ska,k,skb->sab", n, weights * (size / 2.0) ** 3, n, optimize=True)
+    values, _ = shape_functions(_gauss_points(divisions))
+    out = (size / divisions) ** 3 * values[:, :, None] * values[:, None, :]
     out.setflags(write=False)
     return out

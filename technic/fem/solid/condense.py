@@ -26,6 +26,7 @@ from scipy import sparse
 from technic.errors import InputError
 from technic.fem.solid.cells import (
     CELL_NODES,
+    gauss_weights,
     packed_indices,
     sub_mass,
     sub_stiffness,
@@ -82,15 +83,13 @@ class Solid:
         return np.asarray(self.mass @ wide).reshape(x.shape)
 
 
-def element_stiffness(
-    mesh: Mesh, material: Material, elements: NDArray[np.int64]
-) -> Array:
+def element_stiffness(mesh: Mesh, material: Material, elements: NDArray[np.int64]) -> Array:
     """Return stiffness matrices (m, 60, 60) of elements of a mesh (N/m)."""
     settings = mesh.settings
     parts = sub_stiffness(settings.divisions, settings.cell, material)
     rows, columns = packed_indices()
-    fill = mesh.fill[elements]
-    packed = (fill + settings.void * (1.0 - fill)) @ parts
+    weights = gauss_weights(mesh.fill[elements], mesh.moment[elements]).reshape(len(elements), -1)
+    packed = (weights + settings.void * (0.125 - weights)) @ parts
     out = np.empty((len(elements), 3 * CELL_NODES, 3 * CELL_NODES))
     out[:, rows, columns] = packed
     out[:, columns, rows] = packed
@@ -101,11 +100,14 @@ def mass_matrix(mesh: Mesh, density: float) -> sparse.csr_array:
     """Return the consistent mass of one direction of displacement, (n, n) (kg)."""
     settings = mesh.settings
     parts = sub_mass(settings.divisions, settings.cell).reshape(-1, CELL_NODES**2)
-    entries = density * (mesh.fill @ parts)
+    weights = gauss_weights(mesh.fill, mesh.moment).reshape(len(mesh.cells), -1)
+    entries = density * (weights @ parts)
     row = np.repeat(mesh.nodes, CELL_NODES, axis=1)
     column = np.tile(mesh.nodes, (1, CELL_NODES))
     count = len(mesh.points)
-    matrix = sparse.coo_array((entries.ravel(), (row.ravel(), column.ravel())), shape=(count, count))
+    matrix = sparse.coo_array(
+        (entries.ravel(), (row.ravel(), column.ravel())), shape=(count, count)
+    )
     return matrix.tocsr()
 
 
@@ -209,9 +211,7 @@ def build_super_element(
     return condense(part_id, solid, ports, key=key)
 
 
-def condense(
-    part_id: str, solid: Solid, ports: Sequence[Port], *, key: str = ""
-) -> SuperElement:
+def condense(part_id: str, solid: Solid, ports: Sequence[Port], *, key: str = "") -> SuperElement:
     """Condense a factorised part onto its ports; parameters as for `build_super_element`."""
     mesh = solid.mesh
     samples = [sample_port(mesh, port) for port in ports]
@@ -304,7 +304,9 @@ def _invert(
     local = np.median(np.diag(scaled))
     if values[0] < DEPENDENT * min(values[-1], local):
         load = np.abs(basis @ vectors[:, 0]).reshape(count, 6).max(axis=1)
-        names = [port.name for port, size in zip(ports, load, strict=True) if size > 0.1 * load.max()]
+        names = [
+            port.name for port, size in zip(ports, load, strict=True) if size > 0.1 * load.max()
+        ]
         raise InputError(
             f"part {part_id}: the frames of ports {', '.join(names)} depend on each other",
             remedy="use smaller cells, or leave one of these ports out",

@@ -74,6 +74,8 @@ class Mesh:
         Position of each element's cell in the grid.
     fill : (e, divisions**3) ndarray
         Share of each sub-cube that belongs to the element.
+    moment : (e, divisions**3, 3) ndarray of float32
+        First moments, see `technic.fem.solid.inside.Filling`.
     nodes : (e, 20) ndarray of int
         Node numbers of each element.
     points : (n, 3) ndarray
@@ -91,6 +93,7 @@ class Mesh:
     origin: Array
     cells: NDArray[np.int64]
     fill: Array
+    moment: NDArray[np.float32]
     nodes: NDArray[np.int64]
     points: Array
     owner: NDArray[np.int64]
@@ -169,8 +172,20 @@ def mesh_part(triangles: Array, settings: MeshSettings) -> Mesh:
     fill = np.zeros((len(cells), n**3))
     local = ((place[0] % n) * n + place[1] % n) * n + place[2] % n
     fill[owner[place], local] = fraction[place]
+    moment = np.zeros((len(cells), n**3, 3), dtype=np.float32)
+    moment[owner[place], local] = filling.moment[place]
     return Mesh(
-        settings, origin, cells, fill, numbered, points, owner, loose, filling.leaking, filling.open_rays
+        settings=settings,
+        origin=origin,
+        cells=cells,
+        fill=fill,
+        moment=moment,
+        nodes=numbered,
+        points=points,
+        owner=owner,
+        loose=loose,
+        leaking=filling.leaking,
+        open_rays=filling.open_rays,
     )
 
 

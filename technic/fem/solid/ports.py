@@ -250,9 +250,7 @@ def frame_rows(mesh: Mesh, port: Port, samples: Samples) -> sparse.csr_array:
     columns = (3 * nodes[:, :, None] + np.arange(3)).ravel()
     size = 3 * len(mesh.points)
     row = np.repeat(np.arange(6), len(columns))
-    return sparse.coo_array(
-        (entries.ravel(), (row, np.tile(columns, 6))), shape=(6, size)
-    ).tocsr()
+    return sparse.coo_array((entries.ravel(), (row, np.tile(columns, 6))), shape=(6, size)).tocsr()
 
 
 def wall_rows(mesh: Mesh, port: Port, samples: Samples) -> tuple[sparse.csr_array, Array, Array]:
@@ -275,5 +273,3 @@ def wall_rows(mesh: Mesh, port: Port, samples: Samples) -> tuple[sparse.csr_arra
     ).tocsr()
     rigid = _rigid_rows(samples.points, port.position).reshape(-1, 6)
     return matrix, rigid, np.repeat(samples.weights, 3)
-
-

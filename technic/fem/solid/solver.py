@@ -100,7 +100,9 @@ class Factor:
 def _triangular(lower: Array, right: Array, *, transpose: bool) -> Array:
     """Solve with a lower triangle stored by rows (its transpose is an upper one stored by columns)."""
     return np.asarray(
-        blas.dtrsm(1.0, lower.T, np.asfortranarray(right), side=0, lower=0, trans_a=int(not transpose))
+        blas.dtrsm(
+            1.0, lower.T, np.asfortranarray(right), side=0, lower=0, trans_a=int(not transpose)
+        )
     )
 
 
@@ -171,9 +173,7 @@ def factorize(
             below = f21
             if b:
                 solved = blas.dtrsm(1.0, factor, f21.T, side=0, lower=0, trans_a=1, overwrite_b=1)
-                f22 = blas.dsyrk(
-                    -1.0, solved, beta=1.0, c=f22.T, trans=1, lower=0, overwrite_c=1
-                ).T
+                f22 = blas.dsyrk(-1.0, solved, beta=1.0, c=f22.T, trans=1, lower=0, overwrite_c=1).T
                 below = solved.T
             outer_unknowns = (3 * rank[outer][:, None] + np.arange(3)).ravel()
             fronts.append(_Front(start, factor.T, outer_unknowns, below))

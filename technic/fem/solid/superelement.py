@@ -73,7 +73,9 @@ class SuperElement:
             object.__setattr__(self, name, readonly(getattr(self, name)))
         size = 6 * len(self.ports)
         if self.stiffness.shape != (size, size) or self.mass.shape != (size, size):
-            raise ValueError(f"super-element {self.id}: {len(self.ports)} ports need {size} unknowns")
+            raise ValueError(
+                f"super-element {self.id}: {len(self.ports)} ports need {size} unknowns"
+            )
 
     def index(self, port: str) -> int:
         """Return the position of a port (or of the one it is merged with); KeyError if unknown."""
@@ -166,9 +168,7 @@ def _keep_for_mass(element: SuperElement, used: list[int]) -> tuple[list[int], f
         kept = sorted([*kept, int(np.argmax(gaps))])
 
 
-def super_element_to_element(
-    element: SuperElement, used: Sequence[str]
-) -> tuple[Element, float]:
+def super_element_to_element(element: SuperElement, used: Sequence[str]) -> tuple[Element, float]:
     """Return a part as an element of an assembly, with as few unknowns as its mass allows.
 
     Parameters
