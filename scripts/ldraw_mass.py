@@ -195,7 +195,7 @@ def main() -> None:
     names = Catalogue(rows, known)
     for part in asked.only or [p for p in rows if p not in known]:
         row = rows[part][1]
-        triangles = surfaces.triangles(f"{row.get('geometry', part)}.dat")
+        triangles = surfaces.triangles(f"{part}.dat")
         if len(triangles) == 0:
             print(f"{part}: no geometry", file=sys.stderr)
             continue
