@@ -306,3 +306,22 @@ def test_public_names_are_there():
         assert getattr(technic, name) is not None
     with pytest.raises(AttributeError):
         _ = technic.no_such_name
+
+
+def test_demo_is_rigid_but_soft_in_twist_and_says_where_the_picture_is(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run("demo")
+    assert code == 0
+    assert "153 parts" in out
+    assert "\nRIGID\n" in out
+    assert "twists about" in out
+    assert err == "picture: technic-demo.png\n"
+    assert (tmp_path / "technic-demo.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_demo_without_picture(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = run("demo", "--no-picture", "--json", "-", "--require-rigid")
+    assert code == 0
+    assert json.loads(out)["model"]["parts"] == 153
+    assert not list(tmp_path.iterdir())

@@ -53,6 +53,8 @@ _FAINT = 0.25
 
 _SPOTS = 3
 
+_CROWDED = 60
+
 _NAMED = 24
 """More port names than this would hide the part."""
 
@@ -136,7 +138,8 @@ def outline(drawing: Drawing, points: tuple[Array, ...]) -> Lines:
         np.concatenate(edges),
         np.tile(np.array(OUTLINE), (len(everything), 1)),
         width=1.0,
-        opacity=0.7,
+        # Many parts have many edges behind each other.
+        opacity=0.7 if len(points) < _CROWDED else 0.3,
     )
 
 
@@ -371,7 +374,7 @@ def part_scene(definition: PartDefinition) -> Scene:
     camera = fit(np.concatenate([s.points for s in surfaces]), toward)
     panel = Panel("", surfaces, (edges,), camera, names if len(names) <= _NAMED else ())
     legend = [
-        LegendItem("arrow", MOTION_COLOR, f"{count(len(definition.ports), 'port')}, their axes")
+        LegendItem("arrow", MOTION_COLOR, f"{count(len(definition.ports), 'port')}: names and axes")
     ]
     if solid.stand_in:
         legend.append(LegendItem("none", NEUTRAL, "without a shape: drawn as tubes"))
