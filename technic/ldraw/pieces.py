@@ -21,6 +21,7 @@ from technic.geometry import Array
 __all__ = [
     "JOIN",
     "PITCH_LDU",
+    "SAME_LINE",
     "Line",
     "Piece",
     "PieceKind",

@@ -8,6 +8,7 @@ never copied into this project: it is read where the user has it.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -16,7 +17,7 @@ from typing import Final
 
 import numpy as np
 
-from technic.errors import InputError
+from technic.errors import InputError, MissingDependency
 from technic.geometry import Array, readonly
 from technic.ldraw.library import Library, Reference, reference_key
 from technic.ldraw.storage import Store, open_store
@@ -24,6 +25,7 @@ from technic.ldraw.storage import Store, open_store
 __all__ = [
     "ShadowLibrary",
     "Snap",
+    "find_shadow",
     "snaps_of",
 ]
 
@@ -138,6 +140,26 @@ class ShadowLibrary:
     def where(self, key: str) -> str:
         """Return how a message names the shadow of the file at `key`."""
         return f"{self.store.path}/{key}"
+
+
+def find_shadow(explicit: str | Path | None = None) -> ShadowLibrary | None:
+    """Return the shadow library to use: `explicit`, else ``TECHNIC_SHADOW``, else None.
+
+    It is never looked for elsewhere: whose ports are used is the user's choice.
+
+    Raises
+    ------
+    MissingDependency
+        The place does not exist.
+    InputError
+        It exists, but is no shadow library.
+    """
+    place = explicit or os.environ.get("TECHNIC_SHADOW")
+    if not place:
+        return None
+    if not Path(place).exists():
+        raise MissingDependency(f"there is no LDCad shadow library at {place}")
+    return ShadowLibrary.open(place)
 
 
 def _numbers(text: str, count: int, what: str) -> Array:

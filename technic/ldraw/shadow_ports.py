@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from technic.ldraw.features import Feature, build_features, to_ports
 from technic.ldraw.library import Library
-from technic.ldraw.pieces import Piece
-from technic.ldraw.primitives import carries_ports
+from technic.ldraw.pieces import SAME_LINE, Piece
+from technic.ldraw.primitives import carries_ports, features_from_primitives, walker_of
 from technic.ldraw.shadow import ShadowLibrary, snaps_of
 from technic.ldraw.snap_shapes import pieces_of
 from technic.parts.definition import Port, PortKind
@@ -90,8 +92,20 @@ def ports_from_shadow(
     resolved = library.resolve(number)
     title = library.file(resolved.key).title.lower() if resolved else ""
     # "pin with friction", but not "without friction"
-    rough = "friction" in title and "without friction" not in title
+    by_title = "friction" in title and "without friction" not in title
+    drawn = [
+        feature
+        for feature in features_from_primitives(walker_of(library), number) or ()
+        if feature.kind is PortKind.PIN
+    ]
+
+    def rough(pin: Feature) -> bool:
+        for feature in drawn:
+            if np.linalg.norm(feature.middle - pin.middle) < SAME_LINE:
+                return feature.friction
+        return by_title
+
     return to_ports(
-        replace(feature, friction=rough) if feature.kind is PortKind.PIN else feature
+        replace(feature, friction=rough(feature)) if feature.kind is PortKind.PIN else feature
         for feature in features
     )

@@ -31,7 +31,7 @@ MAX_RATIO: Final = 200
 MAX_FILES: Final = 1_000_000
 """Largest number of files in a library; the full library has 45 thousand."""
 
-_INDEX_VERSION: Final = "technic-library-index 2"
+_INDEX_VERSION: Final = "technic-library-index 3"
 _TOP: Final = ("p", "parts", "models", "unofficial")
 _RELEASE = re.compile(rb"!LDRAW_ORG[^\r\n]*UPDATE (\d{4}-\d{2})")
 
@@ -217,7 +217,7 @@ class FolderStore:
 
 
 class ZipStore:
-    """A library in a zip, with or without the ``ldraw/`` prefix of the official one."""
+    """A library in a zip, with or without a folder around it (``ldraw/`` in the official one)."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -249,8 +249,12 @@ class ZipStore:
             ) from None
         if len(infos) > MAX_FILES:
             raise InputError(f"more than {MAX_FILES} files: not a parts library", path=self.path)
-        for info in infos:
-            key = info.filename.replace("\\", "/").lower().removeprefix("ldraw/")
+        names = [info.filename.replace("\\", "/").lower() for info in infos]
+        # the official zip has everything below "ldraw/", downloads from GitHub below a name of theirs
+        tops = {name.split("/", 1)[0] for name in names if "/" in name}
+        wrapper = f"{tops.pop()}/" if len(tops) == 1 and not tops & {*_TOP} else "ldraw/"
+        for info, name in zip(infos, names, strict=True):
+            key = name.removeprefix(wrapper)
             if key.split("/", 1)[0] not in _TOP or ".." in key.split("/"):
                 continue
             if not key.endswith((".dat", ".ldr", ".mpd")):

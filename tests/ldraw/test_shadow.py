@@ -7,11 +7,11 @@ import csv
 import numpy as np
 import pytest
 
-from technic.errors import InputError
+from technic.errors import InputError, MissingDependency
 from technic.ldraw.agreement import Cause, differences
 from technic.ldraw.library import Library
 from technic.ldraw.primitives import ports_from_primitives
-from technic.ldraw.shadow import ShadowLibrary, snaps_of
+from technic.ldraw.shadow import ShadowLibrary, find_shadow, snaps_of
 from technic.ldraw.shadow_ports import ports_from_shadow
 from technic.parts.definition import Port, PortKind
 from technic.units import LDU
@@ -184,7 +184,12 @@ def test_mirrored_references(ports, mirror, count):
     assert len(ports(mirrored, NOTHING, connhole=snap)) == count
 
 
-def test_friction_comes_from_the_title(tmp_path):
+def test_friction_comes_from_the_primitive(ports):
+    found = ports(line("confric.dat"), meta("CYL", PIN) + meta("CYL", f"{PIN} [pos=40 0 0]"))
+    assert found == ["pin1 (0 -10 0) (0 -1 0) 20 f", "pin2 (40 -10 0) (0 -1 0) 20"]
+
+
+def test_friction_comes_from_the_title_where_no_primitive_tells(tmp_path):
     files = files_with(
         {
             "parts/1.dat": part(title="Technic Pin with Friction"),
@@ -282,3 +287,14 @@ def test_snaps_are_read_once(tmp_path):
     library = Library.open(write_folder(tmp_path / "l", files_with({"parts/1.dat": part()})))
     shadow = ShadowLibrary.open(write_folder(tmp_path / "s", {"parts/1.dat": meta("CYL", HOLE)}))
     assert snaps_of(shadow, library, "parts/1.dat") is snaps_of(shadow, library, "parts/1.dat")
+
+
+def test_the_shadow_library_is_named_by_the_user(tmp_path, monkeypatch):
+    monkeypatch.delenv("TECHNIC_SHADOW", raising=False)
+    assert find_shadow() is None
+    place = write_zip(tmp_path / "s.zip", {"parts/1.dat": meta("CYL", HOLE)}, "downloaded-main/")
+    assert there(find_shadow(place)).has("parts/1.dat")
+    monkeypatch.setenv("TECHNIC_SHADOW", str(place))
+    assert there(find_shadow()).has("parts/1.dat")
+    with pytest.raises(MissingDependency, match="no LDCad shadow library"):
+        find_shadow(tmp_path / "missing")
