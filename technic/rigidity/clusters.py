@@ -40,6 +40,8 @@ class Cluster:
     parts : tuple of int
     reference : (3,) ndarray
         Point about which twists of the cluster are taken (m).
+    origin : (3,) ndarray
+        Centroid of the first part (m).
     outer : tuple of int
         Joints and supports to anything outside.
     fasteners_only : bool
@@ -50,6 +52,7 @@ class Cluster:
 
     parts: tuple[int, ...]
     reference: Array
+    origin: Array
     outer: tuple[int, ...]
     fasteners_only: bool
     mass: float
@@ -155,6 +158,7 @@ def _cluster(kin: Kinematics, parts: tuple[int, ...], outer: tuple[int, ...]) ->
     return Cluster(
         parts=parts,
         reference=reference,
+        origin=kin.origins[parts[0]],
         outer=outer,
         fasteners_only=all(m.fastener for m in members),
         mass=sum(m.mass_properties.mass for m in members if not m.fastener),

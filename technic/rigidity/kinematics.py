@@ -18,7 +18,7 @@ from technic.geometry import Array, shift_twist
 from technic.groups import connected_groups
 from technic.rigidity.nullspace import Block, NullSpace, null_space
 from technic.system.rows import transfer
-from technic.tolerances import MOBILITY_LENGTH
+from technic.tolerances import MOBILITY_CUT, MOBILITY_LENGTH
 
 __all__ = ["ComponentMotions", "Kinematics", "component_motions", "kinematics"]
 
@@ -147,8 +147,13 @@ def _components(assembly: Assembly) -> tuple[tuple[int, ...], ...]:
     return tuple(sorted(found, key=lambda c: (-sum(mass[k] for k in c), c)))
 
 
-def component_motions(kin: Kinematics, component: int) -> ComponentMotions:
-    """Return the null space of one component: every motion in which each joint is respected."""
+def component_motions(
+    kin: Kinematics, component: int, cut: float = MOBILITY_CUT
+) -> ComponentMotions:
+    """Return the null space of one component: every motion in which each joint is respected.
+
+    Singular values below `cut` count as motions.
+    """
     parts = kin.components[component]
     links = kin.links_of(component)
     dofs = kin.dofs
@@ -168,7 +173,7 @@ def component_motions(kin: Kinematics, component: int) -> ComponentMotions:
             continue
         block = [kin.sides[k, s][np.ix_(rows, dofs)] @ carry[p] for s, p in enumerate(owner)]
         blocks.append((tuple(number[bodies[p]] for p in owner), np.hstack(block)))
-    space: NullSpace = null_space(blocks, len(heads), width)
+    space: NullSpace = null_space(blocks, len(heads), width, cut)
     expand = sparse.lil_array((6 * len(parts), width * len(heads)))
     for k, p in enumerate(parts):
         h = width * number[bodies[p]]

@@ -14,8 +14,10 @@ import numpy as np
 from technic.geometry import Array, shift_twist
 from technic.rigidity.clusters import Cluster, LocalMotion, find_clusters
 from technic.rigidity.kinematics import ComponentMotions, Kinematics
+from technic.rigidity.order import FIRST_ORDER, split_by_order
 from technic.rigidity.result import Motion, MotionKind
 from technic.rigidity.screw import describe_twists
+from technic.rigidity.structural import structural_space
 from technic.rigidity.symmetry import is_rotor
 from technic.tolerances import MOTION_KIND_CUT, SAME_LINE
 
@@ -63,15 +65,25 @@ def sort_motions(kin: Kinematics, motions: ComponentMotions, component: int) -> 
                 continue  # the main body stands still, unless it is a rod that turns about itself
             if kind is not MotionKind.STRUCTURAL:
                 local.append((kind, cluster, motion))
-    structural = _structural(kin, motions, clusters, local, grounded)
+    space = structural_space(
+        kin,
+        motions,
+        clusters,
+        [(c, m) for kind, c, m in local if kind is not MotionKind.IDLE],
+        grounded=grounded,
+    )
+    structural = split_by_order(kin, motions, component, space)
     spinning = sum(kind is MotionKind.SPINNING for kind, _, _ in local)
     sliding = sum(kind is MotionKind.SLIDING for kind, _, _ in local)
     idle = motions.internal - len(structural) - spinning - sliding
-    out = [_motion(kin, component, MotionKind.STRUCTURAL, clusters, t) for t in structural]
+    out = [
+        _motion(kin, component, MotionKind.STRUCTURAL, clusters, space.of_clusters(vector), order)
+        for vector, order in structural
+    ]
     for kind, cluster, motion in local:
         out.append(_motion(kin, component, kind, [cluster], motion.twist[None]))
-    order = list(MotionKind)
-    out.sort(key=lambda m: (order.index(m.kind), -len(m.parts)))
+    kinds = list(MotionKind)
+    out.sort(key=lambda m: (kinds.index(m.kind), m.order == FIRST_ORDER, -len(m.parts)))
     return SortedMotions(len(structural), spinning, sliding, idle, tuple(out), tuple(clusters))
 
 
@@ -120,125 +132,13 @@ def _one_line(kin: Kinematics, cluster: Cluster) -> bool:
     return True
 
 
-def _structural(
-    kin: Kinematics,
-    motions: ComponentMotions,
-    clusters: list[Cluster],
-    local: list[tuple[MotionKind, Cluster, LocalMotion]],
-    grounded: bool,
-) -> list[Array]:
-    """Return a sparse basis of the structural motions, each (clusters, 6): twists of the clusters.
-
-    Fastener-only clusters are given the motion they take part in, without their own idle share.
-    """
-    field = _cluster_field(kin, motions, clusters)
-    bodies = [n for n, c in enumerate(clusters) if not c.fasteners_only]
-    if not bodies:
-        return []
-    if not grounded:
-        field = field - _as_one_body(kin, clusters, field[0])
-    own = {id(c): n for n, c in enumerate(clusters)}
-    flat = field[bodies].reshape(6 * len(bodies), -1)
-    flat = flat[:, np.abs(flat).max(axis=0) > 0.0]
-    removed = []
-    for _, c, m in local:
-        n = own[id(c)]
-        if n == 0 and not grounded:  # seen from the main body everything else turns
-            main = _as_one_body(kin, clusters, m.twist[:, None])[bodies, :, 0]
-            main[bodies.index(0)] = 0.0
-            removed.append(main.ravel())
-        elif not c.fasteners_only:
-            removed.append(_embed(bodies.index(n), len(bodies), m.twist))
-    if removed:
-        q, _ = np.linalg.qr(np.array(removed).T)
-        flat = flat - q @ (q.T @ flat)
-    if flat.shape[1] == 0:
-        return []
-    u, values, _ = np.linalg.svd(flat, full_matrices=False)
-    space = u[:, values > MOTION_KIND_CUT * max(1.0, float(values[0]))]
-    basis = _sparse_basis(space, len(bodies))
-    out = []
-    for vector in basis:
-        twists = np.zeros((len(clusters), 6))
-        twists[bodies] = vector
-        out.append(twists)
-    return out
-
-
-def _embed(body: int, bodies: int, twist: Array) -> Array:
-    out = np.zeros((bodies, 6))
-    out[body] = twist
-    return out.ravel()
-
-
-def _cluster_field(kin: Kinematics, motions: ComponentMotions, clusters: list[Cluster]) -> Array:
-    """Return the twist of every cluster about its reference point, (clusters, 6, k)."""
-    place = {p: k for k, p in enumerate(motions.parts)}
-    rows = motions.twists.tocsr()
-    out = np.zeros((len(clusters), 6, motions.twists.shape[1]))
-    for n, cluster in enumerate(clusters):
-        p = cluster.parts[0]
-        arm = (cluster.reference - kin.origins[p]) / kin.length
-        out[n] = shift_twist(arm) @ rows[6 * place[p] : 6 * place[p] + 6].toarray()
-    return out
-
-
-def _as_one_body(kin: Kinematics, clusters: list[Cluster], main: Array) -> Array:
-    """Return the field when every cluster moves with the main body."""
-    arms = np.array([(c.reference - clusters[0].reference) / kin.length for c in clusters])
-    return shift_twist(arms) @ main
-
-
-def _sparse_basis(space: Array, bodies: int) -> list[Array]:
-    """Return a basis whose vectors move as few bodies as a greedy search finds.
-
-    For each body in turn, the largest last, other bodies are held still one after another as long as
-    some motion of this body is left; the shortest independent results are kept.
-    """
-    count = space.shape[1]
-    blocks = space.reshape(bodies, 6, count)
-    size = np.linalg.norm(blocks, axis=(1, 2))
-    moving = [b for b in range(bodies) if size[b] > MOTION_KIND_CUT]
-    found: list[Array] = []
-    for body in moving:
-        still = np.eye(count)
-        for other in moving:
-            if other == body or still.shape[1] == 1:
-                continue
-            _, values, vt = np.linalg.svd(blocks[other] @ still, full_matrices=True)
-            values = np.concatenate([values, np.zeros(still.shape[1] - len(values))])[
-                : still.shape[1]
-            ]
-            trial = still @ vt[values < MOTION_KIND_CUT].T
-            if trial.shape[1] and np.linalg.norm(blocks[body] @ trial, 2) > MOTION_KIND_CUT:
-                still = trial
-        _, _, vt = np.linalg.svd(blocks[body] @ still)
-        vector = (space @ (still @ vt[0])).reshape(bodies, 6)
-        found.append(vector / np.abs(vector).max())
-    found.sort(key=lambda v: int(np.sum(np.linalg.norm(v, axis=1) > MOTION_KIND_CUT)))
-    chosen: list[Array] = []
-    taken = np.zeros((space.shape[0], 0))
-    for vector in found:
-        rest = vector.ravel() / np.linalg.norm(vector)
-        for _ in range(2):
-            rest = rest - taken @ (taken.T @ rest)
-        if np.linalg.norm(rest) > MOTION_KIND_CUT:
-            chosen.append(vector)
-            taken = np.column_stack([taken, rest / np.linalg.norm(rest)])
-        if len(chosen) == count:
-            break
-    for column in (space - taken @ (taken.T @ space)).T:  # what the search did not reach
-        if len(chosen) == count:
-            break
-        rest = column - taken @ (taken.T @ column)
-        if np.linalg.norm(rest) > MOTION_KIND_CUT:
-            chosen.append(rest.reshape(bodies, 6) / np.abs(rest).max())
-            taken = np.column_stack([taken, rest / np.linalg.norm(rest)])
-    return chosen
-
-
 def _motion(
-    kin: Kinematics, component: int, kind: MotionKind, clusters: list[Cluster], twists: Array
+    kin: Kinematics,
+    component: int,
+    kind: MotionKind,
+    clusters: list[Cluster],
+    twists: Array,
+    order: str | None = None,
 ) -> Motion:
     """Turn twists of clusters into a record: parts, type, axis, freeing joints."""
     parts: list[int] = []
@@ -265,6 +165,7 @@ def _motion(
         axis_point=shape.point,
         axis_direction=shape.direction,
         pitch=shape.pitch,
+        order=order,
         component=component,
     )
 

@@ -61,7 +61,9 @@ class _Pivot:
     smallest: float
 
 
-def null_space(blocks: list[Block], bodies: int, width: int) -> NullSpace:
+def null_space(
+    blocks: list[Block], bodies: int, width: int, cut: float = MOBILITY_CUT
+) -> NullSpace:
     """Return the null space of the rows in `blocks`.
 
     Parameters
@@ -71,12 +73,14 @@ def null_space(blocks: list[Block], bodies: int, width: int) -> NullSpace:
         Number of bodies.
     width : int
         Unknowns per body (6 in space, 3 in the plane).
+    cut : float
+        Singular values below it are motions.
     """
     matrix = _stack(blocks, bodies, width)
     if bodies <= CORE:
-        return _dense(matrix.toarray(), bodies * width)
-    pivots, core, rest = _eliminate(blocks, bodies, width)
-    vectors, kept = _vectors(pivots, core, rest, bodies, width)
+        return _dense(matrix.toarray(), bodies * width, cut)
+    pivots, core, rest = _eliminate(blocks, bodies, width, min(cut, PIVOT_ZERO))
+    vectors, kept = _vectors(pivots, core, rest, bodies, width, cut)
     lengths = np.sqrt(np.asarray(vectors.multiply(vectors).sum(axis=0)).ravel())
     basis = sparse.csc_array(vectors @ sparse.diags_array(1.0 / lengths))
     image = matrix @ basis
@@ -102,12 +106,12 @@ def _stack(blocks: list[Block], bodies: int, width: int) -> sparse.csr_array:
     return sparse.csr_array((np.concatenate(data), coordinates), shape=(row, bodies * width))
 
 
-def _dense(matrix: Array, columns: int) -> NullSpace:
+def _dense(matrix: Array, columns: int, cut: float) -> NullSpace:
     if len(matrix) == 0:
         return NullSpace(sparse.csc_array(np.eye(columns)), float("inf"), 0.0)
     _, values, vt = np.linalg.svd(matrix, full_matrices=True)
     values = np.concatenate([values, np.zeros(columns - len(values))])
-    dropped = values < MOBILITY_CUT
+    dropped = values < cut
     kept = values[~dropped]
     return NullSpace(
         sparse.csc_array(vt[dropped].T),
@@ -117,7 +121,7 @@ def _dense(matrix: Array, columns: int) -> NullSpace:
 
 
 def _eliminate(
-    blocks: list[Block], bodies: int, width: int
+    blocks: list[Block], bodies: int, width: int, zero: float
 ) -> tuple[list[_Pivot], list[int], list[Block]]:
     """Eliminate bodies, least neighbours first, until the rest is small or no pivot is clear."""
     store: dict[int, Block] = dict(enumerate(blocks))
@@ -143,7 +147,7 @@ def _eliminate(
         own, rest = rows[:, :width], rows[:, width:]
         u, values, vt = np.linalg.svd(own, full_matrices=True)
         values = np.concatenate([values, np.zeros(width - len(values))])
-        if np.any((values > PIVOT_ZERO) & (values < PIVOT_CLEAR)):
+        if np.any((values > zero) & (values < PIVOT_CLEAR)):
             stuck[body] = degree
             continue
         rank = int(np.sum(values >= PIVOT_CLEAR))
@@ -184,7 +188,12 @@ def _gather(blocks: list[Block], order: list[int], width: int) -> Array:
 
 
 def _vectors(
-    pivots: list[_Pivot], core: list[int], rest: list[Block], bodies: int, width: int
+    pivots: list[_Pivot],
+    core: list[int],
+    rest: list[Block],
+    bodies: int,
+    width: int,
+    cut: float,
 ) -> tuple[sparse.csc_array, float]:
     """Return a basis of the null space as sparse columns, and the smallest value kept in the core."""
     dense = _gather(rest, core, width) if core else np.zeros((0, 0))
@@ -192,7 +201,7 @@ def _vectors(
         dense = np.asarray(np.linalg.qr(dense, mode="r"))
     _, values, vt = np.linalg.svd(dense, full_matrices=True)
     values = np.concatenate([values, np.zeros(dense.shape[1] - len(values))])
-    count = int(np.sum(values < MOBILITY_CUT))
+    count = int(np.sum(values < cut))
     kept = float(values[: len(values) - count].min(initial=np.inf))
     start = vt[len(values) - count :].T
     entries: dict[int, tuple[NDArray[np.int64], Array]] = {

@@ -1,0 +1,201 @@
+"""Finite motion: move parts a real step, put the joints back together, count again.
+
+At first order a frame may seem to move where it only shakes: its joints allow a velocity but no path. The
+step is taken along the velocity, the joints are closed again by Gauss-Newton with the constraints written
+exactly (rotations are finite), and what can still move there is counted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import linalg as sparse_linalg
+from scipy.spatial.transform import Rotation
+
+from technic.assembly.joint_types import JointType
+from technic.assembly.model import Assembly
+from technic.geometry import Array, Pose
+from technic.rigidity.kinematics import Kinematics
+
+__all__ = ["Placement", "close_joints", "placed_assembly", "step"]
+
+CLOSED = 1e-9
+"""Joints are closed when no held motion is off by more than this (scaled lengths, radians)."""
+
+ITERATIONS = 40
+"""Gauss-Newton steps: on a path it takes five; where there is none each step halves the distance."""
+
+DAMPING = 1e-11
+"""Relative damping of the normal equations: just above rounding, so that free motions stay put."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """Where the parts of a component are after a finite motion.
+
+    Parameters
+    ----------
+    origins : (n, 3) ndarray
+        Centroids (m).
+    turns : (n, 3, 3) ndarray
+        Rotation of each part since the start.
+    """
+
+    origins: Array
+    turns: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Links:
+    """Joints and supports of a component as arrays: side 0 and 1 (for supports the ground)."""
+
+    parts: NDArray[np.int64]
+    points: Array
+    axes: Array
+    arms: Array
+    held: NDArray[np.bool_]
+    universal: NDArray[np.bool_]
+
+
+def start(kin: Kinematics, parts: tuple[int, ...]) -> Placement:
+    """Return the placement in which the model was read."""
+    return Placement(kin.origins[list(parts)].copy(), np.tile(np.eye(3), (len(parts), 1, 1)))
+
+
+def step(placement: Placement, twists: Array) -> Placement:
+    """Return the placement after every part moved by a finite twist about its centroid (m, rad)."""
+    return Placement(
+        placement.origins + twists[:, :3],
+        Rotation.from_rotvec(twists[:, 3:]).as_matrix() @ placement.turns,
+    )
+
+
+def _links(kin: Kinematics, parts: tuple[int, ...], links: list[int]) -> _Links:
+    place = {p: k for k, p in enumerate(parts)}
+    joints, supports = kin.assembly.joints, kin.assembly.supports
+    count = len(joints)
+    points = np.zeros((len(links), 3))
+    axes = np.tile(np.eye(3), (len(links), 1, 1))
+    owner = np.full((len(links), 2), -1)
+    universal = np.zeros(len(links), dtype=bool)
+    for row, k in enumerate(links):
+        owner[row, : len(kin.owners[k])] = [place[p] for p in kin.owners[k]]
+        if k < count:
+            points[row], axes[row] = joints[k].point, joints[k].axes
+            universal[row] = joints[k].type is JointType.UNIVERSAL
+        else:
+            support = supports[k - count]
+            points[row] = kin.origins[support.part] if support.point is None else support.point
+    origins = kin.origins[list(parts)]
+    arms = points[:, None, :] - np.where(owner[..., None] < 0, 0.0, origins[owner])
+    return _Links(owner, points, axes, arms, kin.held[links], universal)
+
+
+def _sides(links: _Links, placement: Placement) -> tuple[Array, Array]:
+    """Return points (links, 2, 3) and axes (links, 2, 3, 3) of both sides; the ground stays."""
+    ground = links.parts < 0
+    turns = np.where(ground[..., None, None], np.eye(3), placement.turns[links.parts])
+    origins = np.where(ground[..., None], 0.0, placement.origins[links.parts])
+    points = origins + np.einsum("kscd,ksd->ksc", turns, links.arms)
+    axes = np.einsum("kad,kscd->ksac", links.axes, turns)
+    return points, axes
+
+
+def _gaps(links: _Links, placement: Placement, length: float) -> Array:
+    """Return the six relative motions of every link, scaled, exact for finite motions."""
+    points, axes = _sides(links, placement)
+    out = np.zeros((len(links.parts), 6))
+    # axes of side 1, because that is the ground for supports
+    out[:, :3] = np.einsum("kac,kc->ka", axes[:, 1], points[:, 0] - points[:, 1]) / length
+    relative = axes[:, 1] @ np.swapaxes(axes[:, 0], 1, 2)
+    out[:, 3:] = Rotation.from_matrix(relative).as_rotvec()
+    # a universal joint keeps its two axes at the angle they had, whatever it turns about them
+    cross = np.einsum("kc,kc->k", axes[:, 0, 1], axes[:, 1, 2])
+    out[links.universal, 3] = -cross[links.universal]
+    return out
+
+
+def _jacobian(
+    links: _Links, placement: Placement, length: float, dofs: NDArray[np.int64]
+) -> sparse.csr_array:
+    points, axes = _sides(links, placement)
+    n = len(placement.origins)
+    width = len(dofs)
+    data, rows, columns = [], [], []
+    index = np.cumsum(links.held.ravel()).reshape(links.held.shape) - 1
+    for side in (0, 1):
+        for k, part in enumerate(links.parts[:, side]):
+            if part < 0:
+                continue
+            arm = (points[k, 0] - placement.origins[part]) / length
+            e = axes[k, 1]
+            block = np.zeros((6, 6))
+            block[:3, :3] = block[3:, 3:] = e
+            # e (theta x arm) = (arm x e) theta, row by row
+            block[:3, 3:] = np.cross(arm, e)
+            held = links.held[k]
+            block = (1.0 - 2.0 * side) * block[held][:, dofs]
+            data.append(block.ravel())
+            rows.append(np.repeat(index[k][held], width))
+            columns.append(np.tile(np.arange(width * part, width * part + width), held.sum()))
+    shape = (int(links.held.sum()), width * n)
+    if not data:
+        return sparse.csr_array(shape)
+    return sparse.csr_array(
+        (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns))), shape=shape
+    )
+
+
+def close_joints(
+    kin: Kinematics, parts: tuple[int, ...], links: list[int], moved: Placement
+) -> Placement | None:
+    """Return the placement near `moved` in which every joint is closed as well as at the start.
+
+    Returns
+    -------
+    Placement or None
+        None when the joints could not be closed.
+    """
+    arrays = _links(kin, parts, links)
+    dofs = kin.dofs
+    target = _gaps(arrays, start(kin, parts), kin.length)
+    here = moved
+    for _ in range(ITERATIONS):
+        gaps = (_gaps(arrays, here, kin.length) - target)[arrays.held]
+        if np.abs(gaps).max(initial=0.0) < CLOSED:
+            return here
+        j = _jacobian(arrays, here, kin.length, dofs)
+        normal = sparse.csc_array(j.T @ j)
+        damping = DAMPING * float(normal.diagonal().max())
+        matrix = sparse.csc_array(normal + damping * sparse.eye_array(normal.shape[0]))
+        try:
+            change = sparse_linalg.splu(matrix).solve(-(j.T @ gaps))
+        except RuntimeError:
+            return None
+        twists = np.zeros((len(parts), 6))
+        twists[:, dofs] = change.reshape(len(parts), -1)
+        here = step(here, twists * kin.units)
+    gaps = (_gaps(arrays, here, kin.length) - target)[arrays.held]
+    return here if np.abs(gaps).max(initial=0.0) < 1e3 * CLOSED else None
+
+
+def placed_assembly(
+    kin: Kinematics, parts: tuple[int, ...], links: list[int], placement: Placement
+) -> Assembly:
+    """Return the assembly with a component moved to a placement; other components stay."""
+    arrays = _links(kin, parts, links)
+    points, axes = _sides(arrays, placement)
+    new_parts = list(kin.assembly.parts)
+    for k, p in enumerate(parts):
+        old = new_parts[p].pose
+        turn = placement.turns[k]
+        translation = placement.origins[k] + turn @ (old.translation - kin.origins[p])
+        new_parts[p] = replace(new_parts[p], pose=Pose(turn @ old.rotation, translation))
+    joints = list(kin.assembly.joints)
+    for row, k in enumerate(links):
+        if k < len(joints):
+            joints[k] = replace(joints[k], point=points[row, 0], axes=axes[row, 0])
+    return replace(kin.assembly, parts=tuple(new_parts), joints=tuple(joints))

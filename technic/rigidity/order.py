@@ -1,0 +1,142 @@
+"""Which structural motions are real mechanisms and which exist at first order only."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from technic.geometry import Array, shift_twist
+from technic.rigidity.finite import Placement, close_joints, placed_assembly, start, step
+from technic.rigidity.kinematics import (
+    ComponentMotions,
+    Kinematics,
+    component_motions,
+    kinematics,
+)
+from technic.rigidity.structural import StructuralSpace, cluster_field, sparse_basis
+from technic.tolerances import MOBILITY_CUT, MOTION_KIND_CUT
+
+__all__ = ["FINITE", "FIRST_ORDER", "split_by_order"]
+
+FINITE = "finite"
+FIRST_ORDER = "first-order"
+
+STEP = 0.2
+"""How far the part that goes furthest is moved (scaled: 8 LDU, or 0.2 rad): far enough that what stiffens
+does so well above the tolerance for motions, and near enough to stay on the same branch."""
+
+MOVED = 0.1
+"""A step counts as made when this share of it is left after the joints are closed: on a path nearly all
+is left, elsewhere each iteration halves it."""
+
+CUT = 1e-7
+"""Singular values below this are motions at the place reached: the joints are closed there to 1e-9, and
+what stiffens does so with the square of the step in the worst case (on the beam cubes 4e-6). Where the
+joints of the file do not line up, ten times their misfit."""
+
+TRIALS = 3
+"""Random directions tried: where several paths leave one configuration, the one of most freedom counts."""
+
+
+def split_by_order(
+    kin: Kinematics, motions: ComponentMotions, component: int, space: StructuralSpace
+) -> list[tuple[Array, str]]:
+    """Return a readable basis of the structural motions with the order of each.
+
+    Returns
+    -------
+    list of (vector, order)
+        As many as `space` has dimensions; "finite" ones span what can really move.
+    """
+    bodies = len(space.bodies)
+    if space.size == 0:
+        return []
+    readable = sparse_basis(space.basis, bodies)
+    finite = _finite_directions(kin, motions, component, space)
+    count = finite.shape[1]
+    if count == space.size:
+        return [(v, FINITE) for v in readable]
+    if count == 0:
+        return [(v, FIRST_ORDER) for v in readable]
+    out = [(v, FINITE) for v in sparse_basis(finite, bodies)]
+    taken, _ = np.linalg.qr(finite)
+    for vector in readable:
+        flat = vector.ravel() / np.linalg.norm(vector)
+        for _ in range(2):
+            flat = flat - taken @ (taken.T @ flat)
+        if len(out) < space.size and np.linalg.norm(flat) > MOTION_KIND_CUT:
+            out.append((vector, FIRST_ORDER))
+            taken = np.column_stack([taken, flat / np.linalg.norm(flat)])
+    return out
+
+
+def _finite_directions(
+    kin: Kinematics, motions: ComponentMotions, component: int, space: StructuralSpace
+) -> Array:
+    """Return an orthonormal basis, (6 * bodies, f), of the motions that have a path."""
+    links = kin.links_of(component)
+    best = np.zeros((len(space.basis), 0))
+    cut = min(max(CUT, 10.0 * motions.largest_dropped), MOBILITY_CUT)
+    for trial in range(TRIALS):
+        share = np.random.default_rng(trial).normal(size=space.size)
+        twists = space.lift(motions, space.basis @ share)
+        twists = twists * (STEP / np.abs(twists).max())
+        there = step(start(kin, motions.parts), twists * kin.units)
+        placement = close_joints(kin, motions.parts, links, there)
+        if placement is None or _progress(kin, motions, placement, there) < MOVED:
+            continue
+        moved = kinematics(placed_assembly(kin, motions.parts, links, placement))
+        later = component_motions(moved, component, cut)
+        count = space.size - (motions.internal - later.internal)
+        if count > best.shape[1]:
+            best = _tangent(moved, later, placement, motions.parts, space, count)
+        if best.shape[1] == space.size:
+            break
+    return best
+
+
+def _progress(
+    kin: Kinematics, motions: ComponentMotions, placement: Placement, aim: Placement
+) -> float:
+    """Return how much of the step is left: the movement along it, as a share."""
+    begin = start(kin, motions.parts)
+    wanted = np.hstack(
+        [(aim.origins - begin.origins) / kin.length, (aim.turns - begin.turns).reshape(-1, 9)]
+    )
+    made = np.hstack(
+        [
+            (placement.origins - begin.origins) / kin.length,
+            (placement.turns - begin.turns).reshape(-1, 9),
+        ]
+    )
+    return float(np.sum(wanted * made) / np.sum(wanted**2))
+
+
+def _tangent(
+    moved: Kinematics,
+    later: ComponentMotions,
+    placement: Placement,
+    parts: tuple[int, ...],
+    space: StructuralSpace,
+    count: int,
+) -> Array:
+    """Return the motions at the place reached, seen from the start: the `count` nearest directions."""
+    place = {p: k for k, p in enumerate(parts)}
+    clusters = list(space.clusters)
+    turns = np.array([placement.turns[place[c.parts[0]]] for c in clusters])
+    # twists about the first part's centroid, which is where `moved` knows each cluster to be
+    field = cluster_field(moved, later, clusters, at_part=True)
+    arms = np.zeros((len(clusters), 3))
+    references = np.zeros((len(clusters), 3))
+    for n, c in enumerate(clusters):
+        p = c.parts[0]
+        before = c.origin
+        arms[n] = turns[n] @ (c.reference - before) / moved.length
+        references[n] = placement.origins[place[p]] + turns[n] @ (c.reference - before)
+    field = shift_twist(arms) @ field
+    main = (references - references[0]) / moved.length
+    field = field - shift_twist(main) @ field[0]
+    back = turns[0].T
+    field = np.concatenate([back @ field[:, :3], back @ field[:, 3:]], axis=1)
+    flat = field[list(space.bodies)].reshape(len(space.basis), -1)
+    u, _, _ = np.linalg.svd(space.basis.T @ flat, full_matrices=True)
+    return np.asarray(space.basis @ u[:, :count])

@@ -1,0 +1,178 @@
+"""The structural motions of a component: a space, a readable basis of it, and what moves along.
+
+Seen on the clusters that hold more than fasteners, the main body standing still, what remains when
+spinning and sliding are taken away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from technic.geometry import Array, shift_twist
+from technic.rigidity.clusters import Cluster, LocalMotion
+from technic.rigidity.kinematics import ComponentMotions, Kinematics
+from technic.tolerances import MOTION_KIND_CUT
+
+__all__ = ["StructuralSpace", "cluster_field", "sparse_basis", "structural_space"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StructuralSpace:
+    """Structural motions as scaled twists of clusters about their reference points.
+
+    Parameters
+    ----------
+    clusters : tuple of Cluster
+        Main body first.
+    bodies : tuple of int
+        Clusters that hold more than fasteners.
+    basis : (6 * len(bodies), s) ndarray
+        Orthonormal.
+    removed : (6 * len(bodies), r) ndarray
+        Spinning and sliding of single clusters, orthonormal, taken out of `basis`.
+    field : (6 * len(bodies), k) ndarray
+        The same clusters in every motion of the component, the main body standing still (unless the
+        component is grounded).
+    """
+
+    clusters: tuple[Cluster, ...]
+    bodies: tuple[int, ...]
+    basis: Array
+    removed: Array
+    field: Array
+
+    @property
+    def size(self) -> int:
+        """Number of structural motions."""
+        return int(self.basis.shape[1])
+
+    def of_clusters(self, vector: Array) -> Array:
+        """Return a vector of the space as twists of all clusters, (clusters, 6)."""
+        out = np.zeros((len(self.clusters), 6))
+        out[list(self.bodies)] = vector.reshape(-1, 6)
+        return out
+
+    def lift(self, motions: ComponentMotions, vector: Array) -> Array:
+        """Return the motion of every part that goes with a vector of the space.
+
+        Returns
+        -------
+        (n, 6) ndarray
+            Scaled twists about the parts' centroids, fasteners included; the main body may move.
+        """
+        used = np.flatnonzero(np.abs(self.field).max(axis=0) > 0.0)
+        columns = np.hstack([self.field[:, used], self.removed])
+        share = np.linalg.lstsq(columns, vector, rcond=1e-9)[0][: len(used)]
+        return np.asarray(motions.twists[:, used] @ share).reshape(-1, 6)
+
+
+def structural_space(
+    kin: Kinematics,
+    motions: ComponentMotions,
+    clusters: list[Cluster],
+    local: list[tuple[Cluster, LocalMotion]],
+    *,
+    grounded: bool,
+) -> StructuralSpace:
+    """Return the structural motions.
+
+    Parameters
+    ----------
+    kin : Kinematics
+    motions : ComponentMotions
+    clusters : list of Cluster
+        Main body first.
+    local : list of (Cluster, LocalMotion)
+        Spinning and sliding motions, which are not structural.
+    grounded : bool
+        The component has a support; then the main body may move too.
+    """
+    bodies = [n for n, c in enumerate(clusters) if not c.fasteners_only]
+    own = {id(c): bodies.index(n) for n, c in enumerate(clusters) if n in set(bodies)}
+    field = cluster_field(kin, motions, clusters)
+    if not grounded:
+        arms = np.array([(c.reference - clusters[0].reference) / kin.length for c in clusters])
+        field = field - shift_twist(arms) @ field[0]
+    flat = field[bodies].reshape(6 * len(bodies), -1)
+    removed = np.zeros((6 * len(bodies), 0))
+    for cluster, motion in local:
+        if id(cluster) in own:
+            column = np.zeros((len(bodies), 6))
+            column[own[id(cluster)]] = motion.twist
+            removed = np.column_stack([removed, column.ravel()])
+    removed, _ = np.linalg.qr(removed)
+    rest = flat - removed @ (removed.T @ flat)
+    u, values, _ = np.linalg.svd(rest, full_matrices=False)
+    kept = values > MOTION_KIND_CUT * max(1.0, float(values.max(initial=0.0)))
+    return StructuralSpace(tuple(clusters), tuple(bodies), u[:, kept], removed, flat)
+
+
+def cluster_field(
+    kin: Kinematics,
+    motions: ComponentMotions,
+    clusters: list[Cluster],
+    *,
+    at_part: bool = False,
+) -> Array:
+    """Return the scaled twist of every cluster in every motion, (clusters, 6, k).
+
+    About its reference point, or about the centroid of its first part (`at_part`).
+    """
+    place = {p: k for k, p in enumerate(motions.parts)}
+    rows = motions.twists.tocsr()
+    out = np.zeros((len(clusters), 6, motions.twists.shape[1]))
+    for n, cluster in enumerate(clusters):
+        p = cluster.parts[0]
+        arm = (0.0 if at_part else 1.0) * (cluster.reference - kin.origins[p]) / kin.length
+        out[n] = shift_twist(arm) @ rows[6 * place[p] : 6 * place[p] + 6].toarray()
+    return out
+
+
+def sparse_basis(space: Array, bodies: int) -> list[Array]:
+    """Return a basis whose vectors move as few bodies as a greedy search finds.
+
+    For each body in turn, the largest last, other bodies are held still one after another as long as
+    some motion of this body is left; the shortest independent results are kept.
+    """
+    count = space.shape[1]
+    blocks = space.reshape(bodies, 6, count)
+    size = np.linalg.norm(blocks, axis=(1, 2))
+    moving = [b for b in range(bodies) if size[b] > MOTION_KIND_CUT]
+    found: list[Array] = []
+    for body in moving:
+        still = np.eye(count)
+        for other in moving:
+            if other == body or still.shape[1] == 1:
+                continue
+            _, values, vt = np.linalg.svd(blocks[other] @ still, full_matrices=True)
+            values = np.concatenate([values, np.zeros(still.shape[1] - len(values))])[
+                : still.shape[1]
+            ]
+            trial = still @ vt[values < MOTION_KIND_CUT].T
+            if trial.shape[1] and np.linalg.norm(blocks[body] @ trial, 2) > MOTION_KIND_CUT:
+                still = trial
+        _, _, vt = np.linalg.svd(blocks[body] @ still)
+        vector = (space @ (still @ vt[0])).reshape(bodies, 6)
+        found.append(vector / np.abs(vector).max())
+    found.sort(key=lambda v: int(np.sum(np.linalg.norm(v, axis=1) > MOTION_KIND_CUT)))
+    chosen: list[Array] = []
+    taken = np.zeros((space.shape[0], 0))
+    for vector in found:
+        rest = vector.ravel() / np.linalg.norm(vector)
+        for _ in range(2):
+            rest = rest - taken @ (taken.T @ rest)
+        if np.linalg.norm(rest) > MOTION_KIND_CUT:
+            chosen.append(vector)
+            taken = np.column_stack([taken, rest / np.linalg.norm(rest)])
+        if len(chosen) == count:
+            break
+    for column in (space - taken @ (taken.T @ space)).T:  # what the search did not reach
+        if len(chosen) == count:
+            break
+        rest = column - taken @ (taken.T @ column)
+        if np.linalg.norm(rest) > MOTION_KIND_CUT:
+            chosen.append(rest.reshape(bodies, 6) / np.abs(rest).max())
+            taken = np.column_stack([taken, rest / np.linalg.norm(rest)])
+    return chosen
