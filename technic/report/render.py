@@ -12,6 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import technic
 from technic.errors import MissingDependency
 from technic.report.files import write_atomic
 from technic.report.scene import Scene
@@ -28,6 +29,9 @@ def _start(window: str | None) -> subprocess.Popen[bytes]:
     environment = dict(os.environ)
     if window is not None:
         environment["VTK_DEFAULT_OPENGL_WINDOW"] = window
+    # The process must find the same package, however this one found it.
+    places = [str(Path(technic.__file__).parents[1]), environment.get("PYTHONPATH", "")]
+    environment["PYTHONPATH"] = os.pathsep.join(place for place in places if place)
     return subprocess.Popen(
         [sys.executable, "-m", "technic.report.draw"],
         stdin=subprocess.PIPE,
@@ -69,7 +73,12 @@ class Painter:
             raise MissingDependency(
                 "no picture was drawn: this machine cannot draw off screen"
                 + (f" ({why})" if why else "")
-                + "\n  On Debian or Ubuntu: apt install libegl1 libgl1-mesa-dri"
+                + "\n  "
+                + (
+                    "Install the Python packages again: pip install --upgrade technic-rigidity"
+                    if "No module named" in why
+                    else "On Debian or Ubuntu: apt install libegl1 libgl1-mesa-dri"
+                )
             )
         content = picture
         write_atomic(path, lambda temporary: _write(temporary, content))
