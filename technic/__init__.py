@@ -15,9 +15,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from technic.assembly.builder import Linkage
     from technic.assembly.model import Assembly
     from technic.errors import TechnicError
-    from technic.loading import load
+    from technic.loading import load, save
     from technic.rigidity.analyze import analyze
     from technic.rigidity.result import RigidityReport
     from technic.system.assemble import System, assemble
@@ -26,17 +27,20 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "Assembly": "technic.assembly.model",
+    "Linkage": "technic.assembly.builder",
     "RigidityReport": "technic.rigidity.result",
     "System": "technic.system.assemble",
     "TechnicError": "technic.errors",
     "analyze": "technic.rigidity.analyze",
     "assemble": "technic.system.assemble",
     "load": "technic.loading",
+    "save": "technic.loading",
 }
 """Where each public name lives."""
 
 __all__ = [
     "Assembly",
+    "Linkage",
     "RigidityReport",
     "System",
     "TechnicError",
@@ -44,6 +48,7 @@ __all__ = [
     "analyze",
     "assemble",
     "load",
+    "save",
 ]
 
 

@@ -1,4 +1,4 @@
-"""Read a model file, whatever its format, into an assembly."""
+"""Read a model file, whatever its format, into an assembly; write assembly files."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from technic.assembly.model import Assembly
-from technic.errors import InputError
+from technic.errors import InputError, UsageError
 
-__all__ = ["READERS", "load"]
+__all__ = ["READERS", "load", "save"]
 
 READERS: dict[str, tuple[str, str]] = {
     ".ldr": ("technic.ldraw.reader", "load_ldraw"),
@@ -63,3 +63,24 @@ def load(path: str | Path, **options: Any) -> Assembly:
         reason = error.strerror or str(error)
         raise InputError(f"cannot be read: {reason}", path=error.filename or path) from error
     return assembly
+
+
+def save(assembly: Assembly, path: str | Path) -> None:
+    """Write an assembly file (``.json``); `load` gives the same assembly back.
+
+    Raises
+    ------
+    UsageError
+        The suffix is another one, or the assembly has LEGO parts, which only LDraw files describe.
+    InputError
+        The file cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".json":
+        raise UsageError(f"an assembly is written as .json, not as {path.suffix or 'nothing'!r}")
+    from technic.assembly.writing import save_assembly
+
+    try:
+        save_assembly(assembly, path)
+    except OSError as error:
+        raise InputError(f"cannot be written: {error.strerror or error}", path=path) from error

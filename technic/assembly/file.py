@@ -153,6 +153,14 @@ def _not_finite(value: Any, path: str) -> Iterator[str]:
         yield f"{path}: {value} is not a finite number"
 
 
+def _kept(shape: Mapping[str, Any], material: str, points: Array | None) -> dict[str, Any]:
+    """Return the shape as the part keeps it: in part coordinates, with the points it was given."""
+    out = {k: v for k, v in shape.items() if k not in ("position", "rotation")}
+    if points is not None:
+        out["points"] = points.tolist()
+    return {**out, "material": material}
+
+
 class _Build:
     """One pass over a file that obeys the schema; faults are collected, not raised."""
 
@@ -269,7 +277,7 @@ class _Build:
                 body=made.body,
                 mass_properties=made.mass_properties,
                 fastener=row.get("fastener", False),
-                shape={**shape, "material": name},
+                shape=_kept(shape, name, made.points),
             )
         )
 

@@ -54,10 +54,11 @@ class ShapeFault(Exception):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Made:
-    """A body and its mass."""
+    """A body, its mass, and the points that a shape without geometry was given."""
 
     body: Body
     mass_properties: MassProperties
+    points: Array | None = None
 
 
 def make_shape(
@@ -150,7 +151,7 @@ def _rigid(
     mass = float(shape.get("mass", material.density * PLAIN_SIZE**2 * (PLAIN_SIZE + reach)))
     share = np.full(len(points), mass / len(points))
     own = share[:, None, None] * PLAIN_SIZE**2 / 6.0 * np.eye(3)
-    return Made(RigidBody(), _spread(share, points, own))
+    return Made(RigidBody(), _spread(share, points, own), points)
 
 
 def _section(shape: Mapping[str, Any], material: Material) -> tuple[Section, float, float]:

@@ -11,6 +11,7 @@ import technic
 
 PUBLIC = [
     "Assembly",
+    "Linkage",
     "RigidityReport",
     "System",
     "TechnicError",
@@ -18,6 +19,7 @@ PUBLIC = [
     "analyze",
     "assemble",
     "load",
+    "save",
 ]
 """Taking one away breaks somebody's program: say so in CHANGELOG.md."""
 
