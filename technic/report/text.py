@@ -130,7 +130,8 @@ def _sentence(report: RigidityReport, motion: Motion) -> str:
         kept += 1
     if kept < len(clauses):
         clauses[kept:] = ["and others with them, see --json"]
-    order = _ORDERS.get(motion.order or "")
+    # That a wheel keeps spinning goes without saying.
+    order = _ORDERS.get(motion.order or "") if motion.kind is MotionKind.STRUCTURAL else None
     return "; ".join(clauses) + (f" ({order})." if order else ".")
 
 
