@@ -51,8 +51,8 @@ _VERDICTS = {
 }
 
 _ORDERS = {
-    "finite": "a real mechanism: it keeps moving",
-    "first-order": "shaky: moves a little through pin play, not a mechanism",
+    "finite": "A real mechanism: it keeps moving",
+    "first-order": "Shaky: moves a little through pin play, not a mechanism",
 }
 
 _FINDING_WORDS = {
@@ -132,7 +132,7 @@ def _sentence(report: RigidityReport, motion: Motion) -> str:
         clauses[kept:] = ["and others with them, see --json"]
     # That a wheel keeps spinning goes without saying.
     order = _ORDERS.get(motion.order or "") if motion.kind is MotionKind.STRUCTURAL else None
-    return "; ".join(clauses) + (f" ({order})." if order else ".")
+    return "; ".join(clauses) + (f". {order}." if order else ".")
 
 
 def _motions(report: RigidityReport, style: Style) -> list[str]:

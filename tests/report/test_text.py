@@ -103,8 +103,8 @@ def test_long_lists_of_motions_are_capped(scissors):
 def test_first_order_motion_is_called_shaky(scissors):
     first = dataclasses.replace(scissors.motions[0], order="first-order")
     report = dataclasses.replace(scissors, motions=(first, *scissors.motions[1:]))
-    assert "shaky" in to_text(report)
-    assert "shaky" not in to_text(scissors)
+    assert "Shaky: moves a little" in to_text(report)
+    assert "Shaky" not in to_text(scissors)
 
 
 def test_qualifier_is_said(scissors):
