@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from technic.errors import NumericalError, UsageError
+from technic.errors import UsageError
 from technic.fem.element import Element
 from technic.geometry import Array, readonly, shift_twist
 
@@ -76,6 +76,19 @@ class SuperElement:
             raise ValueError(
                 f"super-element {self.id}: {len(self.ports)} ports need {size} unknowns"
             )
+
+    def scaled(self, stiffness: float, mass: float) -> SuperElement:
+        """Return the part made of another material of the same Poisson's ratio.
+
+        Parameters
+        ----------
+        stiffness, mass : float
+            Ratio of Young's moduli and of densities. Exact when Poisson's ratio is the same; the
+            catalogue's materials (0.35 to 0.39) differ by less than 1 % in effect.
+        """
+        return replace(
+            self, stiffness=self.stiffness * stiffness, mass=self.mass * mass, key=""
+        )
 
     def index(self, port: str) -> int:
         """Return the position of a port (or of the one it is merged with); KeyError if unknown."""
@@ -168,14 +181,22 @@ def _keep_for_mass(element: SuperElement, used: list[int]) -> tuple[list[int], f
         kept = sorted([*kept, int(np.argmax(gaps))])
 
 
-def super_element_to_element(element: SuperElement, used: Sequence[str]) -> tuple[Element, float]:
+def super_element_to_element(
+    element: SuperElement, used: Sequence[str | None], attachments: Array | None = None
+) -> tuple[Element, float]:
     """Return a part as an element of an assembly, with as few unknowns as its mass allows.
+
+    Ports that are not in use are condensed out, except those that the mass needs.
 
     Parameters
     ----------
     element : SuperElement
-    used : sequence of str
+    used : sequence of str or None
         Ports that carry a joint, a load or a support; one frame each, in this order (repeats allowed).
+        None: the port nearest to the attachment, for places without a frame of their own (studs).
+    attachments : (m, 3) ndarray, optional
+        Reference point of each frame (m); by default that of its port. A frame moves rigidly with its
+        port.
 
     Returns
     -------
@@ -186,32 +207,43 @@ def super_element_to_element(element: SuperElement, used: Sequence[str]) -> tupl
     Raises
     ------
     UsageError
-        A port is unknown.
+        A port is unknown, or None stands without an attachment.
     """
-    try:
-        at = [element.index(name) for name in used]
-    except KeyError as fault:
-        raise UsageError(f"part {element.id} has no port {fault.args[0]!r}") from None
-    if not at:
-        at = [int(np.argmin(np.linalg.norm(element.points - element.centroid, axis=1)))]
-    kept, error = _keep_for_mass(element, at)
+    at = [_port_of(element, name, i, attachments) for i, name in enumerate(used)]
+    middle = int(np.argmin(np.linalg.norm(element.points - element.centroid, axis=1)))
+    kept, error = _keep_for_mass(element, at or [middle])
     stiffness, mass = _condense(element, kept)
     points = element.points[kept]
     size = 6 * len(kept)
     identity = np.eye(size).reshape(len(kept), 6, size)
     position = {port: i for i, port in enumerate(kept)}
-    chosen = [position[i] for i in at[: len(used)]]
-    if not np.isfinite(stiffness).all() or not np.isfinite(mass).all():
-        raise NumericalError(f"part {element.id}: condensation failed")
+    chosen = [position[i] for i in at]
+    targets = points[chosen] if attachments is None else np.asarray(attachments, dtype=float)
+    arms = targets.reshape(len(at), 3) - points[chosen].reshape(len(at), 3)
     return (
         Element(
             stiffness=stiffness,
             mass=mass,
             rigid=rigid_motions(points, element.centroid),
-            frames=identity[chosen].reshape(len(chosen), 6, size),
-            frame_points=points[chosen].reshape(len(chosen), 3),
+            frames=shift_twist(arms) @ identity[chosen].reshape(len(at), 6, size),
+            frame_points=targets.reshape(len(at), 3),
             nodes=identity[:, :3],
             node_points=points,
         ),
         error,
     )
+
+
+def _port_of(
+    element: SuperElement, name: str | None, number: int, attachments: Array | None
+) -> int:
+    """Return the port that carries an attachment."""
+    if name is not None:
+        try:
+            return element.index(name)
+        except KeyError:
+            raise UsageError(f"part {element.id} has no port {name!r}") from None
+    if attachments is None:
+        raise UsageError(f"part {element.id}: attachment {number} names no port and has no point")
+    gaps = np.linalg.norm(element.points - np.asarray(attachments)[number], axis=1)
+    return int(np.argmin(gaps))
