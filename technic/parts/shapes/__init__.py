@@ -27,7 +27,7 @@ from technic.parts.shapes.bench import Bench
 from technic.parts.shapes.tables import build, shape_table
 from technic.units import LDU
 
-__all__ = ["SEGMENTS", "has_shape", "mesh"]
+__all__ = ["SEGMENTS", "has_shape", "is_approximate", "mesh"]
 
 SEGMENTS = {"draw": 16, "solid": 48}
 """Sides of a full circle for each level of detail."""
@@ -36,6 +36,15 @@ SEGMENTS = {"draw": 16, "solid": 48}
 def has_shape(definition: PartDefinition) -> bool:
     """Return whether there is a shape table for the part or its family."""
     return shape_table(definition) is not None
+
+
+def is_approximate(definition: PartDefinition) -> bool:
+    """Return whether the shape has the part's volume but not its details.
+
+    Such a shape serves pictures; a stiffness or an inertia computed from it means nothing.
+    """
+    table = shape_table(definition)
+    return table is not None and bool(table.get("approximate", False))
 
 
 @functools.lru_cache(maxsize=512)

@@ -69,7 +69,7 @@ def _gap(a: Bore, b: Bore, plane: list[int], segments: int) -> CrossSection:
     figure = figure - _disc(p, _RIM, segments) - _disc(q, _RIM, segments)
     sides = max(8, segments // 3)
     figure = figure.offset(-_FILLET, JoinType.Round, 2.0, sides)
-    figure = figure.offset(_FILLET, JoinType.Round, 2.0, sides)
+    figure = figure.offset(_FILLET, JoinType.Round, 2.0, sides).simplify(25.0 / segments**2)
     if a.cross:
         figure = figure + _strip(p, q, _ARM, 0.0, distance - _RIM)
     if b.cross:

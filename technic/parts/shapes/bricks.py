@@ -101,6 +101,10 @@ def _block(bench: Bench, table: Mapping[str, Any]) -> Manifold:
         if {(x + 20, z), (x, z + 20), (x + 20, z + 20)} <= grid:
             tube = kernel.cylinder(head, foot, 8.0, bench.segments)
             solids.append(tube - kernel.cylinder(head, foot, 6.0, bench.segments))
+        elif (x + 20, z) in grid and (x, z + 20) not in grid and (x, z - 20) not in grid:
+            middle = (0.0, 0.0, 10.0)
+            post = np.subtract(head, middle), np.subtract(foot, middle)
+            solids.append(kernel.cylinder(post[0], post[1], 4.0, bench.segments))
     if table.get("studs", True):
         solids.append(_studs(bench, {}))
     return kernel.union(solids)
