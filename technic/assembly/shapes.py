@@ -27,7 +27,7 @@ from technic.parts.definition import (
     Section,
     TrussBody,
 )
-from technic.parts.profiles import circle, rectangle
+from technic.parts.profiles import circle, rectangle, tube
 
 __all__ = ["BAR_ELEMENTS", "PLAIN_SIZE", "Made", "ShapeFault", "make_shape", "section_size"]
 
@@ -159,6 +159,10 @@ def _section(shape: Mapping[str, Any], material: Material) -> tuple[Section, flo
     given = shape["section"]
     if given["kind"] == "circle":
         section = circle(float(given["diameter"]), material.poisson)
+    elif given["kind"] == "tube":
+        if not 2.0 * given["wall"] < given["diameter"]:
+            raise ShapeFault(".section.wall", "is thicker than the tube")
+        section = tube(float(given["diameter"]), float(given["wall"]), material.poisson)
     else:
         section = rectangle(float(given["width"]), float(given["height"]), material.poisson)
     return section, section.inertia_z / section.area, section.inertia_y / section.area

@@ -10,7 +10,7 @@ from math import cosh, pi, sinh
 
 from technic.parts.definition import Section
 
-__all__ = ["circle", "rectangle"]
+__all__ = ["circle", "rectangle", "tube"]
 
 _TERMS = 25
 """Terms of the series of the torsion constant; the fifth is already below 1e-4."""
@@ -52,6 +52,17 @@ def circle(diameter: float, poisson: float) -> Section:
     area = pi * diameter**2 / 4.0
     shear = 6.0 * (1.0 + poisson) / (7.0 + 6.0 * poisson) * area
     return Section(area, inertia, inertia, 2.0 * inertia, shear, shear, "circle")
+
+
+def tube(diameter: float, wall: float, poisson: float) -> Section:
+    """Return the section of a round tube with an outer diameter and a wall thickness."""
+    inner = diameter - 2.0 * wall
+    m = inner / diameter
+    inertia = pi * (diameter**4 - inner**4) / 64.0
+    area = pi * (diameter**2 - inner**2) / 4.0
+    bulk = (7.0 + 6.0 * poisson) * (1.0 + m**2) ** 2 + (20.0 + 12.0 * poisson) * m**2
+    shear = 6.0 * (1.0 + poisson) * (1.0 + m**2) ** 2 / bulk * area
+    return Section(area, inertia, inertia, 2.0 * inertia, shear, shear, "tube")
 
 
 def _torsion(a: float, b: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -45,6 +46,7 @@ def cube(tmp_path_factory):
 def add(linkage, name, kind, at, cube):
     """Add a part of a kind that has the joint's point on it or near it."""
     shift = 0.03 if name == "a" else -0.05
+    p: Any
     if len(at) == 2:
         p, q = at, (at[0] + shift, at[1] + 0.07)
         corners = [p, q, (at[0] + shift, at[1] - 0.04)]
@@ -71,7 +73,8 @@ def pair(cube):
         at = (0.02, 0.01, -0.03)[:dimension]
         add(linkage, "a", a, at, cube)
         add(linkage, "b", b, at, cube)
-        axis, second = ((0.6, 0.0, 0.8), (0.8, 0.0, -0.6))
+        axis: Any = (0.6, 0.0, 0.8)
+        second: Any = (0.8, 0.0, -0.6)
         if dimension == 2:
             in_plane = type_ in (JointType.SLIDER, JointType.PLANAR)
             axis, second = ((0.6, 0.8) if in_plane else (0.0, 0.0, 1.0)), (0.6, 0.8)
@@ -104,7 +107,7 @@ def test_the_null_space_is_our_rows_and_the_deformation_of_the_selection(
     system = assemble(pair(dimension, type_, a, b))
     joint = system.assembly.joints[0]
     nodes = [selected_nodes(system, 0, side)[0] for side in (0, 1)]
-    theirs = held_combinations(allowed_motions(joint, *nodes, dimension))
+    theirs = held_combinations(allowed_motions(joint, nodes[0], nodes[1], dimension))
     used = [0, 1, 5] if dimension == 2 else list(range(6))
     size = np.linalg.norm(nodes[0] - joint.point, axis=1).max()
     unit = np.array([1.0] * 3 + [1 / size] * 3)
