@@ -120,8 +120,8 @@ def _lift(
     products = sparse.csc_array(w.T @ weighted)
     if held.shape[1]:
         held = held - w @ sparse_linalg.splu(products).solve(np.asarray(weighted.T @ held))
-    # as stiff as the material, so that lifted motions lie among the highest modes
-    size = float(np.median(stiffness.diagonal())) / gram[local]
+    # an eigenvalue of the size of the stiffest spring, far above every mode worth a report
+    size = float(abs(stiffness.diagonal()).max()) / gram[local]
     lift = sparse.csr_array(weighted @ sparse.diags_array(size) @ weighted.T)
     return lift, orthonormal(measure, held)
 

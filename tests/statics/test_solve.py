@@ -7,7 +7,7 @@ import pytest
 
 from technic.assembly.joint_types import JointType
 from technic.errors import UsageError
-from technic.load.static import Load, deflect
+from technic.statics.solve import Load, deflect
 from technic.system.assemble import Probe
 from tests.mechanics import STEEL, assembly, beam, block, clamp, joint
 
