@@ -124,6 +124,7 @@ def test_twist_is_by_far_the_softest(report: RigidityReport) -> None:
     assert report.modes[1].value > 3.5 * report.modes[0].value
 
 
+@pytest.mark.slow
 @pytest.mark.xfail(
     strict=True,
     reason="the shape of 87082 has a core of radius 8.5 LDU where counterbores have 8: 3.3 mm3 each",
