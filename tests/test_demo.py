@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from technic.assembly.model import Assembly
 from technic.geometry import Array
@@ -92,7 +93,7 @@ def test_every_pin_end_has_its_own_bore(chassis: Assembly) -> None:
     assert set(ends) <= set(bores)
 
 
-def turn(report: RigidityReport, chosen: Array, mode: int) -> Array:
+def turn(report: RigidityReport, chosen: NDArray[np.bool_], mode: int) -> Array:
     """Return the turn (rad) of the rigid motion that fits the movement of the chosen parts best."""
     parts = [part for part, use in zip(report.assembly.parts, chosen, strict=True) if use]
     weight = np.sqrt([part.mass_properties.mass for part in parts])[:, None]
@@ -120,7 +121,7 @@ def test_softest_mode_is_a_twist(report: RigidityReport) -> None:
 
 
 def test_twist_is_by_far_the_softest(report: RigidityReport) -> None:
-    """A brace against twist can then triple the rigidity before another mode becomes the softest."""
+    """There is room to triple the rigidity by braces before another mode becomes the softest."""
     assert report.modes[1].value > 3.5 * report.modes[0].value
 
 
