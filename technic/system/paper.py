@@ -1,15 +1,15 @@
 """The paper's construction of the joint matrix, beside ours.
 
 The paper (Liu et al. 2022, section 4.1) selects a few nodes of both parts at the joint, collects how they
-may move when the joint is respected (`A_allow`: one column per motion of both parts together and per freed
-motion of one of them), and takes the null space of its transpose as the joint's matrix. That says what is
-held, but no row of it means one motion, so no row can be given a stiffness of its own. The program
-therefore writes the held motions down one by one (`technic.system.rows`), and keeps this construction to
-prove, joint by joint, that both hold the same.
+may move when the joint is respected (`A_allow`), and takes the null space of its transpose as the joint's
+matrix. The columns of `A_allow` are the motions of both parts together, the freed motions of one part
+against the other, and the deformations of the selected nodes of each part: they have more freedoms than a
+rigid motion (4 against 3 in the plane, 9 against 6 in space), and a joint does not hold what a part does
+in itself.
 
-The two differ in one respect only: the selected nodes of a part have more freedoms than a rigid motion (4
-against 3 in the plane, 9 against 6 in space), and the paper's null space also holds what is left, the
-deformation of the selection. `deformations` gives these rows.
+The rows of that null space are some orthonormal basis: none of them means one motion, so none can be given
+a stiffness of its own. The program therefore writes the held motions down one by one
+(`technic.system.rows`), and keeps this construction to prove, joint by joint, that both hold the same.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from technic.system.assemble import System
 
 __all__ = [
     "allowed_motions",
-    "deformations",
     "held_combinations",
     "paper_rows",
     "rigid_displacements",
@@ -79,7 +78,7 @@ def rigid_displacements(nodes: Array, at: Array, dimension: int) -> Array:
 
 
 def allowed_motions(joint: Joint, nodes_a: Array, nodes_b: Array, dimension: int) -> Array:
-    """Return ``A_allow``: displacements of the selected nodes in the motions that the joint allows.
+    """Return ``A_allow``: displacements of the selected nodes that the joint allows.
 
     Parameters
     ----------
@@ -91,33 +90,30 @@ def allowed_motions(joint: Joint, nodes_a: Array, nodes_b: Array, dimension: int
     Returns
     -------
     (dimension * (m_a + m_b), k) ndarray
-        Columns: the rigid motions of both parts together, then each freed motion of the second alone.
+        Columns: the rigid motions of both parts together, each freed motion of the second alone, then
+        the deformations of either selection.
     """
     length = _reach(nodes_a, nodes_b, joint.point)
     unit = np.diag([1.0] * 3 + [1.0 / length] * 3)
     move_a = rigid_displacements(nodes_a, joint.point, dimension) @ unit
     move_b = rigid_displacements(nodes_b, joint.point, dimension) @ unit
-    free = linalg.block_diag(joint.axes, joint.axes)[~joint.held].T
+    free = linalg.block_diag(joint.axes, joint.axes)[np.logical_not(joint.held)].T
     used = np.arange(6)
     if dimension == 2:
         # motions out of the plane are neither held nor freed: there are none
         used = PLANE
         free = free[:, np.abs(free[PLANE]).max(axis=0, initial=0.0) > 0.5]
     alone = np.vstack([np.zeros((len(move_a), free.shape[1])), move_b @ free])
-    return np.hstack([np.vstack([move_a, move_b])[:, used], alone])
+    bend = linalg.block_diag(
+        held_combinations(move_a[:, used]).T, held_combinations(move_b[:, used]).T
+    )
+    return np.hstack([np.vstack([move_a, move_b])[:, used], alone, bend])
 
 
 def held_combinations(allowed: Array) -> Array:
     """Return the null space of ``A_allow^T`` as orthonormal rows."""
     u, values, _ = np.linalg.svd(allowed, full_matrices=True)
     return np.asarray(u[:, int(np.sum(values > RANK * values[0])) :].T)
-
-
-def deformations(nodes: Array, at: Array, dimension: int) -> Array:
-    """Return rows that are zero in rigid motions of the nodes: the deformation of the selection."""
-    motions = rigid_displacements(nodes, at, dimension)
-    length = _reach(nodes, nodes, at)
-    return held_combinations(motions @ np.diag([1.0] * 3 + [1.0 / length] * 3))
 
 
 def row_space(matrix: Array) -> Array:
