@@ -88,7 +88,18 @@ def test_liftarm_has_pockets_counterbores_and_bores() -> None:
         "beyond the face": (8.5, 10.5, 10),
     }
     points = np.array([*inside.values(), *outside.values()], dtype=float) * LDU
-    assert shape.contains(points).tolist() == [True] * len(inside) + [False] * len(outside)
+    assert winding(shape.triangles, points).tolist() == [1] * len(inside) + [0] * len(outside)
+
+
+def winding(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """How often a closed surface goes around each point (sum of solid angles, van Oosterom 1983)."""
+    arms = triangles[None] - points[:, None, None]
+    a, b, c = arms[:, :, 0], arms[:, :, 1], arms[:, :, 2]
+    la, lb, lc = (np.linalg.norm(v, axis=-1) for v in (a, b, c))
+    volume = np.einsum("pti,pti->pt", a, np.cross(b, c))
+    ab, bc, ca = ((u * v).sum(-1) for u, v in ((a, b), (b, c), (c, a)))
+    angle = 2.0 * np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb)
+    return np.rint(angle.sum(axis=1) / (4.0 * np.pi)).astype(int)
 
 
 def test_bounds_of_a_liftarm_are_its_nominal_ones() -> None:
