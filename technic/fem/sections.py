@@ -121,7 +121,7 @@ def _moments(
 
 def _torsion(share: Array, corner: Array, size: float, counts: Array) -> float:
     """Return the torsion constant (m4) from the warping function."""
-    ny, nz = int(counts[0]), int(counts[1])
+    nz = int(counts[1])
     used = np.stack(np.nonzero(share > 0.0), axis=1)
     weight = share[used[:, 0], used[:, 1]]
     local = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
@@ -133,7 +133,7 @@ def _torsion(share: Array, corner: Array, size: float, counts: Array) -> float:
     for y in (0.5 - g, 0.5 + g):
         for z in (0.5 - g, 0.5 + g):
             grad = np.array([[z - 1, 1 - z, z, -z], [y - 1, -y, y, 1 - y]]) / size
-            point = corner + (used + [y, z]) * size
+            point = corner + (used + np.array([y, z])) * size
             twist = np.stack([-point[:, 1], point[:, 0]], axis=1)
             part = weight * size**2 / 4.0
             stiffness += grad.T @ grad * size**2 / 4.0

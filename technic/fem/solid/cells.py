@@ -14,9 +14,11 @@ from __future__ import annotations
 
 from functools import lru_cache
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
+from numpy.typing import NDArray
 
 from technic.geometry import Array, readonly
 from technic.parts.definition import Material
@@ -99,12 +101,13 @@ def elasticity(material: Material) -> Array:
     return matrix
 
 
-def packed_indices() -> tuple[Array, Array]:
+def packed_indices() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return rows and columns of the lower triangle of a (60, 60) matrix, in packed order."""
-    return np.tril_indices(3 * CELL_NODES)
+    rows, columns = np.tril_indices(3 * CELL_NODES)
+    return rows.astype(np.int64), columns.astype(np.int64)
 
 
-def gauss_weights(fill: Array, moment: Array) -> Array:
+def gauss_weights(fill: Array, moment: NDArray[np.floating[Any]]) -> Array:
     """Return weights of the eight Gauss points of sub-cubes that are partly filled.
 
     The weights sum to the share that is filled, have its centroid and are not negative. A centroid

@@ -9,9 +9,6 @@ flexibility ``F = C K^-1 C^T`` of the frames. Loads on the frames that balance a
 symmetric, and zero on the rigid motions to the last digit by construction. The mesh follows the
 frames by ``u = X K_p q + R a``, ``X = K^-1 C^T``, ``R`` = rigid motions of the mesh, where `a` makes
 ``C u = q``; the mass is condensed with the same transformation.
-
-Rigid walls (an upper bound on the stiffness) tie every sample of the used ports' surfaces to their
-frame with a stiff penalty instead of in the mean.
 """
 
 from __future__ import annotations
@@ -22,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg import eigh
 
 from technic.errors import InputError
 from technic.fem.solid.cells import (
@@ -34,11 +32,25 @@ from technic.fem.solid.cells import (
 from technic.fem.solid.grid import Mesh, MeshSettings, mesh_part
 from technic.fem.solid.ports import Samples, frame_rows, sample_port
 from technic.fem.solid.solver import Factor, factorize
-from technic.fem.solid.superelement import SuperElement, project_rigid, rigid_motions
+from technic.fem.solid.superelement import (
+    CHECKED_MODES,
+    SuperElement,
+    project_rigid,
+    rigid_motions,
+)
 from technic.geometry import Array, skew
 from technic.parts.definition import Material, Port
 
-__all__ = ["Solid", "build_super_element", "solid_of"]
+__all__ = [
+    "Solid",
+    "build_super_element",
+    "condense",
+    "element_stiffness",
+    "free_modes",
+    "mass_and_centroid",
+    "mass_matrix",
+    "solid_of",
+]
 
 DEPENDENT = 1e-6
 """Two frames are dependent when a balanced load on them moves them less than this share of what the
@@ -202,8 +214,8 @@ def build_super_element(
     Raises
     ------
     InputError
-        The surface is not one body, a port has no material, or two frames depend on each other and
-        are not at the same place.
+        The surface is not one body, a port has no material, or frames depend on each other and are
+        not at the same place.
     """
     if not ports:
         raise InputError(f"part {part_id}: a super-element needs at least one port")
@@ -223,7 +235,7 @@ def condense(part_id: str, solid: Solid, ports: Sequence[Port], *, key: str = ""
     flexibility = right.T @ shapes
     flexibility = (flexibility + flexibility.T) / 2.0
     points = np.array([port.position for port in chosen])
-    mass_total, centroid = _mass_and_centroid(solid)
+    _, centroid = mass_and_centroid(solid.mesh, solid.mass)
     motion = rigid_motions(points, np.zeros(3))
     stiffness, fineness = _invert(flexibility, motion, chosen, part_id)
 
@@ -231,31 +243,76 @@ def condense(part_id: str, solid: Solid, ports: Sequence[Port], *, key: str = ""
     scale = np.tile([1.0, 1.0, 1.0, LENGTH, LENGTH, LENGTH], len(chosen))
     left = np.linalg.pinv(motion * scale[:, None]) * scale
     follow = left @ (np.eye(len(motion)) - flexibility @ stiffness)
-    mass_shapes = solid.apply_mass(shapes)
-    rigid = solid.rigid
-    inner = stiffness @ (shapes.T @ mass_shapes) @ stiffness
-    mixed = stiffness @ (mass_shapes.T @ rigid) @ follow
-    outer = follow.T @ (rigid.T @ solid.apply_mass(rigid)) @ follow
-    mass = inner + mixed + mixed.T + outer
-    del mass_total
+    lift = shapes @ stiffness + solid.rigid @ follow
+    mass = lift.T @ solid.apply_mass(lift)
+    mass = (mass + mass.T) / 2.0
+    error = _mass_error(solid, lift, stiffness, mass)
     return SuperElement(
         id=part_id,
         ports=tuple(port.name for port in chosen),
         points=points,
         stiffness=stiffness,
-        mass=(mass + mass.T) / 2.0,
+        mass=mass,
         centroid=centroid,
         merged=merged,
+        condensation_error=error,
         fineness=fineness,
         key=key,
     )
 
 
-def _mass_and_centroid(solid: Solid) -> tuple[float, Array]:
+def mass_and_centroid(mesh: Mesh, mass: sparse.csr_array) -> tuple[float, Array]:
     """Return the mass (kg) and its centre (m)."""
-    per_node = np.asarray(solid.mass.sum(axis=0)).ravel()
+    per_node = np.asarray(mass.sum(axis=0)).ravel()
     total = float(per_node.sum())
-    return total, per_node @ solid.mesh.points / total
+    return total, per_node @ mesh.points / total
+
+
+def free_modes(solid: Solid, start: Array, rounds: int = 2) -> tuple[Array, Array]:
+    """Return free vibration modes of the fine mesh near a subspace, by inverse iteration.
+
+    Parameters
+    ----------
+    solid : Solid
+    start : (3 n, k) ndarray
+        Approximate modes; rigid motions in them are removed.
+    rounds : int
+        Each reduces the error of a mode by the ratio of its eigenvalue to the first one left out.
+
+    Returns
+    -------
+    eigenvalues : (k,) ndarray
+        (rad2/s2), ascending.
+    modes : (3 n, k) ndarray
+    """
+    rigid = solid.rigid
+    mass_rigid = solid.apply_mass(rigid)
+    gram = rigid.T @ mass_rigid
+
+    def clean(x: Array) -> Array:
+        return np.asarray(x - rigid @ np.linalg.solve(gram, mass_rigid.T @ x))
+
+    x = clean(start)
+    values = np.zeros(x.shape[1])
+    for _ in range(rounds):
+        # The springs carry nothing under loads that balance: then K y = M x up to a rigid motion.
+        load = solid.apply_mass(x)
+        y = clean(solid.factor.solve(load))
+        energy = y.T @ load
+        inertia = y.T @ solid.apply_mass(y)
+        values, turn = eigh((energy + energy.T) / 2.0, (inertia + inertia.T) / 2.0)
+        x = y @ turn
+    return values, x
+
+
+def _mass_error(solid: Solid, lift: Array, stiffness: Array, mass: Array) -> float:
+    """Return how far the lowest elastic eigenvalues of the condensed part are off the fine mesh's."""
+    if len(stiffness) < 12:
+        return 0.0
+    values, modes = eigh(stiffness, mass, subset_by_index=(6, 6 + 2 * CHECKED_MODES - 1))
+    exact, _ = free_modes(solid, lift @ modes)
+    low = slice(0, CHECKED_MODES)
+    return float(np.abs(values[low] / exact[low] - 1.0).max())
 
 
 def _merge_shared(

@@ -109,8 +109,8 @@ class Mesh:
     def element_at(self, points: Array) -> NDArray[np.int64]:
         """Return the element that owns the sub-cube around each point, -1 where there is none."""
         index = np.floor((points - self.origin) / self.settings.sub).astype(np.int64)
-        valid = ((index >= 0) & (index < self.owner.shape)).all(axis=-1)
-        index = np.where(valid[..., None], index, 0)
+        valid = np.asarray((index >= 0) & (index < np.array(self.owner.shape))).all(axis=-1)
+        index = np.where(np.asarray(valid)[..., None], index, 0)
         return np.where(valid, self.owner[index[..., 0], index[..., 1], index[..., 2]], -1)
 
     def reference(self, points: Array, elements: NDArray[np.int64]) -> Array:
@@ -254,7 +254,7 @@ def _connect(
         far = np.nonzero(OFFSETS[:, axis] == 2)[0]
         moved = OFFSETS[far].copy()
         moved[:, axis] = 0
-        near = np.array([int(np.nonzero((OFFSETS == m).all(axis=1))[0][0]) for m in moved])
+        near = np.array([int(np.nonzero((m == OFFSETS).all(axis=1))[0][0]) for m in moved])
         heads.append((pairs[:, :1] * CELL_NODES + far).ravel())
         tails.append((pairs[:, 1:] * CELL_NODES + near).ravel())
     head, tail = np.concatenate(heads), np.concatenate(tails)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,7 +161,9 @@ def _cross(corners: Array, axis: int, shape: tuple[int, int, int]) -> _Crossings
     # Ray i lies at ((i + 0.5) / RAYS + shift): in units of the ray spacing, integer + 0.5.
     plane = (moved[:, :, :2] - shift[:2]) * RAYS - 0.5
     columns, rows = nu * RAYS, nv * RAYS
-    ray_parts, depth_parts, sign_parts = [], [], []
+    ray_parts = [np.zeros(0, dtype=np.int64)]
+    depth_parts = [np.zeros(0)]
+    sign_parts = [np.zeros(0, dtype=np.int64)]
     for ray, depth, sign in _intersect(plane, moved[:, :, 2], rows):
         ray_parts.append(ray)
         depth_parts.append(depth)
@@ -189,13 +192,15 @@ def _cross(corners: Array, axis: int, shape: tuple[int, int, int]) -> _Crossings
     count = nu * nv * nw
     good = np.maximum(valid.reshape(nu, RAYS, nv, RAYS).sum(axis=(1, 3))[:, :, None], 1)
 
-    def collect(weights: Array) -> Array:
-        return np.bincount(flat, weights=weights, minlength=count).reshape(nu, nv, nw)
+    def collect(weights: NDArray[Any]) -> Array:
+        sums = np.bincount(flat, weights=weights.astype(float), minlength=count)
+        return sums.astype(float).reshape(nu, nv, nw)
 
     def integrate(weights: Array) -> Array:
         # A step adds what is left of its own cube, and all of the cubes behind it.
         whole = collect(weights * step)
-        return (collect(weights * step * (cube + 1 - depth)) + np.cumsum(whole, axis=2) - whole) / good
+        rest = collect(weights * step * (cube + 1 - depth))
+        return np.asarray((rest + np.cumsum(whole, axis=2) - whole) / good)
 
     across = [ray // rows % RAYS, ray % rows % RAYS]
     offsets = [((k + 0.5) / RAYS - 0.5) * SPREAD for k in across]

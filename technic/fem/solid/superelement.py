@@ -86,9 +86,7 @@ class SuperElement:
             Ratio of Young's moduli and of densities. Exact when Poisson's ratio is the same; the
             catalogue's materials (0.35 to 0.39) differ by less than 1 % in effect.
         """
-        return replace(
-            self, stiffness=self.stiffness * stiffness, mass=self.mass * mass, key=""
-        )
+        return replace(self, stiffness=self.stiffness * stiffness, mass=self.mass * mass, key="")
 
     def index(self, port: str) -> int:
         """Return the position of a port (or of the one it is merged with); KeyError if unknown."""
