@@ -1,0 +1,239 @@
+"""`technic suggest`: which real beam helps most, where it goes, and what it brings."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from technic.commands.options import AxleSlideOption, JsonOption, QuietOption
+from technic.errors import UsageError
+
+if TYPE_CHECKING:
+    from technic.assembly.model import Assembly
+    from technic.design.suggest import Filters, Suggestion, Suggestions
+
+__all__ = ["suggest"]
+
+
+@dataclass(frozen=True, slots=True)
+class _Wishes:
+    """Filters as they were typed."""
+
+    between: tuple[str, str] | None
+    box: tuple[float, float, float, float, float, float] | None
+    lengths: str | None
+    straight: bool
+    snug: float
+    inventory: Path | None
+    max_parts: int | None
+    keep_out: tuple[str, ...]
+
+
+def _filters(assembly: Assembly, wishes: _Wishes) -> Filters:
+    from technic.assembly.select import find_part
+    from technic.design.suggest import Filters
+    from technic.report.parts_list import read_inventory
+    from technic.units import LDU, MM
+
+    between = None
+    if wishes.between is not None:
+        first, second = (find_part(assembly, text) for text in wishes.between)
+        if first == second:
+            raise UsageError("--between needs two different parts")
+        between = (first, second)
+    box = None
+    if wishes.box is not None:
+        x = [v * LDU for v in wishes.box]
+        box = ((x[0], x[1], x[2]), (x[3], x[4], x[5]))
+    inventory = None
+    if wishes.inventory is not None:
+        try:
+            inventory = read_inventory(wishes.inventory)
+        except OSError as error:
+            raise UsageError(f"{wishes.inventory} cannot be read: {error.strerror}") from error
+    return Filters(
+        between=between,
+        box=box,
+        lengths=_lengths(wishes.lengths),
+        bent=not wishes.straight,
+        snug=wishes.snug * MM,
+        inventory=inventory,
+        max_parts=wishes.max_parts,
+        keep_out=frozenset(find_part(assembly, text) for text in wishes.keep_out),
+    )
+
+
+def _lengths(text: str | None) -> tuple[int, ...] | None:
+    if text is None:
+        return None
+    try:
+        return tuple(int(word) for word in text.split(","))
+    except ValueError as error:
+        raise UsageError(f"--lengths is a list of numbers such as 5,7,9, not {text!r}") from error
+
+
+def _progress(stage: str, done: int, total: int) -> None:
+    if sys.stderr.isatty():
+        end = "\n" if done >= total else ""
+        sys.stderr.write(f"\r{stage} {done} of {total} {end}")
+        sys.stderr.flush()
+
+
+def _taken(answers: Sequence[Suggestions], rank: int, *, sequence: bool) -> list[Suggestion]:
+    """Return the suggestions that ``--apply RANK`` means: one alternative, or a sequence up to it."""
+    every = [s for a in answers for s in (a.suggestions[:1] if sequence else a.suggestions)]
+    if not 1 <= rank <= len(every):
+        raise UsageError(f"there is no suggestion {rank}; there are {len(every)}")
+    return every[:rank] if sequence else [every[rank - 1]]
+
+
+def suggest(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="LDraw file (.ldr, .mpd).")],
+    json: JsonOption = None,
+    top: Annotated[
+        int, typer.Option("--top", min=1, max=100, metavar="N", help="How many alternatives.")
+    ] = 5,
+    count: Annotated[
+        int | None,
+        typer.Option(
+            "--count", min=1, max=100, metavar="K", help="Add beams one after another, at most K."
+        ),
+    ] = None,
+    target: Annotated[
+        float | None,
+        typer.Option(
+            "--target", min=0.0, metavar="N/m", help="Add beams until the model is this rigid."
+        ),
+    ] = None,
+    between: Annotated[
+        tuple[str, str] | None,
+        typer.Option("--between", metavar="A B", help="Only beams that tie these two parts."),
+    ] = None,
+    box: Annotated[
+        tuple[float, float, float, float, float, float] | None,
+        typer.Option("--box", metavar="X Y Z X Y Z", help="Only inside this box (LDU)."),
+    ] = None,
+    lengths: Annotated[
+        str | None,
+        typer.Option("--lengths", metavar="5,7,...", help="Only straight beams of these lengths."),
+    ] = None,
+    straight: Annotated[bool, typer.Option("--straight", help="No bent beams.")] = False,
+    snug: Annotated[
+        float,
+        typer.Option(
+            "--snug", min=0.0, max=0.3, metavar="MM", help="Also where holes miss by this much."
+        ),
+    ] = 0.0,
+    inventory: Annotated[
+        Path | None,
+        typer.Option("--inventory", metavar="CSV", help="Only parts of this list (part,count)."),
+    ] = None,
+    max_parts: Annotated[
+        int | None,
+        typer.Option("--max-parts", min=1, metavar="N", help="Most new parts of one, pins too."),
+    ] = None,
+    keep_out: Annotated[
+        list[str] | None,
+        typer.Option("--keep-out", metavar="PART", help="Tie nothing to it. May be repeated."),
+    ] = None,
+    rank: Annotated[
+        Literal["ritz", "paper"],
+        typer.Option("--rank", help="ritz: modes of the model; paper: its projection heuristic."),
+    ] = "ritz",
+    shortlist: Annotated[
+        int,
+        typer.Option("--shortlist", min=1, max=1000, metavar="N", help="How many to re-analyse."),
+    ] = 24,
+    apply: Annotated[
+        int | None,
+        typer.Option("--apply", min=1, metavar="RANK", help="Write the model with this one."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Where --apply writes.")
+    ] = None,
+    parts_list: Annotated[
+        Path | None,
+        typer.Option(
+            "--parts-list", metavar="FILE", help="Write FILE.xml (BrickLink wanted list), FILE.csv."
+        ),
+    ] = None,
+    color: Annotated[
+        int, typer.Option("--color", min=0, metavar="CODE", help="LDraw colour of new parts.")
+    ] = 25,
+    axle_slide: AxleSlideOption = "held",
+    quiet: QuietOption = False,
+) -> None:
+    """Say which real beam makes a model more rigid, and write the model with it."""
+    from technic.design.apply import write_reinforced
+    from technic.design.suggest import needs, reinforce
+    from technic.design.suggest import suggest as find
+    from technic.loading import load
+    from technic.report.files import check_writable
+    from technic.report.json import STDOUT, write_json
+    from technic.report.parts_list import write_parts_list
+
+    if (apply is None) != (out is None):
+        raise UsageError("--apply RANK and --out FILE go together")
+    for path in (out, parts_list, Path(json) if json not in (None, STDOUT) else None):
+        if path is not None:
+            check_writable(path)
+    if model.suffix.lower() == ".json":
+        raise UsageError("suggestions are made of LEGO parts: give an LDraw model (.ldr, .mpd)")
+    assembly = load(model, axle_slide=axle_slide)
+    wishes = _Wishes(
+        between, box, lengths, straight, snug, inventory, max_parts, tuple(keep_out or ())
+    )
+    filters = _filters(assembly, wishes)
+    sequence = count is not None or target is not None
+    if sequence:
+        answers = reinforce(
+            assembly,
+            steps=count or 100,
+            target=target,
+            filters=filters,
+            shortlist=shortlist,
+            rank=rank,
+            color=color,
+            axle_slide=axle_slide,
+            progress=_progress,
+        )
+    else:
+        answers = [
+            find(
+                assembly,
+                count=top,
+                shortlist=shortlist,
+                rank=rank,
+                filters=filters,
+                color=color,
+                axle_slide=axle_slide,
+                progress=_progress,
+            )
+        ]
+    chosen = _taken(answers, apply, sequence=sequence) if apply is not None else []
+    if json is not None:
+        from technic.report.suggest_json import suggestions_dict
+
+        write_json(suggestions_dict(answers, sequence=sequence), json)
+    if not quiet and json != STDOUT:
+        from technic.report.style import style_for
+        from technic.report.suggest_text import alternatives_text, sequence_text
+
+        style = style_for(sys.stdout)
+        text = sequence_text(answers, style) if sequence else alternatives_text(answers[0], style)
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    if out is not None:
+        write_reinforced(model, out, assembly, [s.change for s in chosen])
+    if parts_list is not None:
+        every = [s for a in answers for s in (a.suggestions if sequence else a.suggestions[:1])]
+        total: Counter[str] = Counter()
+        for suggestion in chosen or every:
+            total.update(needs(suggestion.candidate))
+        write_parts_list(parts_list, total)

@@ -1,0 +1,179 @@
+"""Suggestions as a builder reads them: which part, where, pinned to what, and what it brings."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from technic.assembly.model import Assembly
+from technic.design.candidates import Attachment, describe_fit
+from technic.design.suggest import Suggestion, Suggestions, needs
+from technic.parts.catalogue import catalogue
+from technic.report.style import Style
+from technic.report.wording import count, joined, number, part_name, place, spot_words
+from technic.rigidity.result import RigidityReport, Verdict
+from technic.units import LDU
+
+__all__ = ["alternatives_text", "cure_words", "hole_words", "parts_words", "sequence_text"]
+
+_SIDES = {
+    "+x": "from the right",
+    "-x": "from the left",
+    "+y": "from below",
+    "-y": "from above",
+    "+z": "from behind",
+    "-z": "from the front",
+}
+
+
+def parts_words(suggestion: Suggestion) -> str:
+    """Return the new parts: ``"Beam 7 (32524), 2 x Pin with friction (2780)"``."""
+    said = []
+    for part, n in needs(suggestion.candidate).items():
+        definition = catalogue().get(part)
+        name = f"{definition.title} ({part})" if definition is not None else part
+        said.append(name if n == 1 else f"{n} x {name}")
+    return joined(said)
+
+
+def _coordinates(point: Sequence[float]) -> str:
+    return "(" + ", ".join(number(round(v / LDU, 2) + 0.0, 4) for v in point) + ")"
+
+
+def hole_words(assembly: Assembly, attachment: Attachment) -> str:
+    """Return how one hole of the new beam is fastened."""
+    fastening = attachment.fastening
+    held = joined([part_name(assembly.parts[p], line=True) for p in fastening.parts])
+    where = f"hole at {_coordinates(attachment.point)}"
+    if fastening.kind == "pin":
+        return f"{where}: new pin {fastening.pin} into {held}"
+    old = assembly.parts[fastening.old_pin]
+    if fastening.kind == "present":
+        return f"{where}: on the open end of {part_name(old, line=True)} in {held}"
+    return (
+        f"{where}: pin {fastening.pin} in place of {part_name(old)} ({place(old)}), through {held}"
+    )
+
+
+def cure_words(before: RigidityReport, suggestion: Suggestion) -> str:
+    """Return what gets better."""
+    went = before.mobility.structural - suggestion.report.mobility.structural
+    if went > 0:
+        if not suggestion.stops:
+            return f"takes away {count(went, 'motion')}"
+        names = joined([str(n) for n in suggestion.stops])
+        word = "motion" if len(suggestion.stops) == 1 else "motions"
+        left = suggestion.report.mobility.structural
+        return f"works against {word} {names}; {went} of {went + left} gone"
+    if suggestion.relieves is None:
+        return "relieves no single weak spot"
+    spot, left_share = suggestion.relieves
+    return (
+        f"relieves weak spot {spot.rank}, {spot_words(before.assembly, spot)}: "
+        f"{100 * spot.energy_share:.1f} % of the strain energy before, {100 * left_share:.1f} % after"
+    )
+
+
+def _state(report: RigidityReport) -> str:
+    said = report.verdict.value
+    if report.mobility.structural:
+        said += f", {count(report.mobility.structural, 'motion')}"
+    if report.rigidity is not None:
+        said += f", {number(report.rigidity.value)} N/m"
+    return said
+
+
+def _suggestion(before: RigidityReport, suggestion: Suggestion, style: Style) -> list[str]:
+    assembly = before.assembly
+    candidate = suggestion.candidate
+    after = suggestion.report
+    factor = "" if suggestion.factor is None else f" ({number(suggestion.factor)} times)"
+    lines = style.wrap(f"{suggestion.rank}. {parts_words(suggestion)}", "", "   ")
+    lines[0] = style("bold", lines[0])
+    lines += style.wrap(
+        f"Then: {_state(after)}{factor}. It {cure_words(before, suggestion)}.", "   "
+    )
+    for attachment in candidate.attachments:
+        lines += style.wrap(hole_words(assembly, attachment), "   - ", "     ")
+    sides = Counter(_SIDES[side] for side in suggestion.sides)
+    pushed = f"pins go in {joined(list(sides))}" if sides else "no new pin is needed"
+    forecast = number(suggestion.forecast.rigidity)
+    lines += style.wrap(
+        f"It {describe_fit(candidate)}; {pushed}. Forecast {forecast} N/m before re-analysis.",
+        "   ",
+    )
+    return lines
+
+
+def _head(answer: Suggestions, style: Style) -> list[str]:
+    before = answer.before
+    return [
+        style("bold", f"{before.assembly.name}: {count(len(before.assembly.parts), 'part')}"),
+        f"Now: {_state(before)}",
+    ]
+
+
+def _none(answer: Suggestions, style: Style) -> list[str]:
+    if not answer.places:
+        why = (
+            "no two free holes, or pins that a longer one could replace, lie so that a beam would tie "
+            "two parts together"
+        )
+    elif answer.refused:
+        why = "; ".join(f"{n} x {reason}" for reason, n in answer.refused.most_common())
+        why = f"none of {count(answer.places, 'place')} can be built: {why}"
+    else:
+        why = f"none of {count(answer.places, 'place')} makes the model more rigid"
+    return style.wrap(f"Nothing fits: {why}.")
+
+
+def _how_sure(report: RigidityReport, style: Style) -> list[str]:
+    rigidity = report.rigidity
+    if rigidity is None or rigidity.interval_95 is None:
+        return style.wrap(
+            "How sure: verdicts and motions do not depend on stiffnesses; N/m do, and the joints' "
+            "stiffnesses are not calibrated."
+        )
+    low, high = rigidity.interval_95
+    return style.wrap(f"How sure: 95 % between {number(low)} and {number(high)} N/m.")
+
+
+def alternatives_text(answer: Suggestions, style: Style | None = None) -> str:
+    """Return alternatives, best first, with a final newline."""
+    style = Style() if style is None else style
+    lines = _head(answer, style)
+    if not answer.suggestions:
+        lines += ["", *_none(answer, style)]
+        return "\n".join(lines) + "\n"
+    lines += ["", f"One part, best first (of {count(answer.places, 'place')}):"]
+    for suggestion in answer.suggestions:
+        lines += ["", *_suggestion(answer.before, suggestion, style)]
+    lines += ["", *_how_sure(answer.suggestions[0].report, style)]
+    return "\n".join(lines) + "\n"
+
+
+def sequence_text(answers: Sequence[Suggestions], style: Style | None = None) -> str:
+    """Return beams added one after another, with a final newline."""
+    style = Style() if style is None else style
+    if not answers:
+        return "The model is as rigid as demanded: nothing to add.\n"
+    lines = _head(answers[0], style)
+    taken = [answer for answer in answers if answer.suggestions]
+    total: Counter[str] = Counter()
+    for answer in taken:
+        lines += ["", *_suggestion(answer.before, answer.suggestions[0], style)]
+        total.update(needs(answer.suggestions[0].candidate))
+    if len(taken) < len(answers):
+        lines += ["", *_none(answers[-1], style)]
+    if taken:
+        last = taken[-1].suggestions[0].report
+        lines += ["", *style.wrap(f"In the end: {_state(last)}.{_gain(answers[0].before, last)}")]
+        said = joined([f"{n} x {part}" for part, n in sorted(total.items())])
+        lines += [*style.wrap(f"Parts: {said}."), *_how_sure(last, style)]
+    return "\n".join(lines) + "\n"
+
+
+def _gain(before: RigidityReport, after: RigidityReport) -> str:
+    if before.rigidity is None or after.rigidity is None or before.verdict is not Verdict.RIGID:
+        return ""
+    return f" That is {number(after.rigidity.value / before.rigidity.value)} times as rigid."
