@@ -15,7 +15,7 @@ from technic.report.solids import Solid
 from technic.report.wording import count
 from technic.rigidity.result import Motion, MotionKind, RigidityReport
 
-__all__ = ["MOTION_COLOR", "MotionLayers", "motion_layers"]
+__all__ = ["MOTION_COLOR", "MotionLayers", "motion_glyphs", "motion_layers"]
 
 MOTION_COLOR: RGB = (0.05, 0.58, 0.22)
 
@@ -90,6 +90,20 @@ def _glyph(
     return arrow(center, 0.16 * diagonal * move / speed, radius, MOTION_COLOR)
 
 
+def motion_glyphs(
+    motion: Motion,
+    report: RigidityReport,
+    points: Sequence[Array],
+    diagonal: float,
+    limit: int = _ARROWS_FIRST,
+) -> list[Surface]:
+    """Return the arrows of one motion: one for each of the largest `limit` bodies that it moves."""
+    found = (
+        _glyph(motion, group, report, points, diagonal) for group in _groups(motion, report)[:limit]
+    )
+    return [glyph for glyph in found if glyph is not None]
+
+
 def motion_layers(
     report: RigidityReport, points: Sequence[Array], solids: Sequence[Solid], diagonal: float
 ) -> MotionLayers | None:
@@ -134,8 +148,7 @@ def motion_layers(
     glyphs = [
         glyph
         for motion, limit in [(first, _ARROWS_FIRST)] + [(m, 1) for m in motions[1:_MOTIONS_SHOWN]]
-        for group in _groups(motion, report)[:limit]
-        if (glyph := _glyph(motion, group, report, points, diagonal)) is not None
+        for glyph in motion_glyphs(motion, report, points, diagonal, limit)
     ]
     said = [f"what moves: outlines show motion 1 of {len(motions)}, arrows its direction"]
     if len(motions) == 1:

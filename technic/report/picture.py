@@ -6,16 +6,20 @@ load (orange) over its undeformed outline, exaggerated by a stated factor.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from technic.assembly.model import Assembly
 from technic.geometry import Array
 from technic.parts.definition import PartDefinition
 from technic.report.arrows import arrow
 from technic.report.camera import fit, view_direction
-from technic.report.deform import bend_field, move_rigidly
+from technic.report.drawing import (
+    Drawing,
+    deformation_scale,
+    deformed_points,
+    drawing_of,
+    furthest_way,
+)
+from technic.report.load_arrows import LOAD_COLOR, load_arrows
 from technic.report.motion_picture import MOTION_COLOR, motion_layers
 from technic.report.palette import NEUTRAL, color_rgb
 from technic.report.scene import (
@@ -28,28 +32,17 @@ from technic.report.scene import (
     Surface,
     merge,
 )
-from technic.report.solids import Solid, solid_of, world_points
+from technic.report.solids import solid_of
 from technic.report.wording import count, number, spot_words
 from technic.report.worst_field import WorstField, worst_field
 from technic.rigidity.result import RigidityReport, Verdict
 from technic.rigidity.serialize import unit_load
 from technic.units import MM
 
-__all__ = ["Drawing", "drawing_of", "part_scene", "report_scene"]
+__all__ = ["part_scene", "report_scene"]
 
-LOAD_COLOR: RGB = (0.96, 0.49, 0.0)
 OUTLINE: RGB = (0.55, 0.57, 0.60)
 SPOT_COLOR: RGB = (0.80, 0.07, 0.18)
-
-_DEFORMED_SHARE = 0.07
-"""The furthest point of the deformed shape goes this share of the model's diagonal."""
-
-_ARROW_SHARE = 0.16
-_ARROW_RADIUS = 0.0045
-_ARROWS = 24
-_APART = 0.04
-_FAINT = 0.25
-"""Loads below this share of the largest are not drawn."""
 
 _SPOTS = 3
 
@@ -60,36 +53,6 @@ _NAMED = 24
 
 _WHOLE_ASPECT, _HALF_ASPECT = 1.9, 1.0
 """Width over height, about, of a panel that is alone and of one of two."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Drawing:
-    """The undeformed model ready to be drawn.
-
-    Parameters
-    ----------
-    assembly : Assembly
-    solids : tuple of Solid
-        One per part.
-    points : tuple of (n, 3) ndarray
-        World points of each solid (m).
-    diagonal : float
-        Of the box around everything (m).
-    """
-
-    assembly: Assembly
-    solids: tuple[Solid, ...]
-    points: tuple[Array, ...]
-    diagonal: float
-
-
-def drawing_of(assembly: Assembly) -> Drawing:
-    """Return the shapes of all parts in their places."""
-    solid = solid_of()
-    solids = tuple(solid(part) for part in assembly.parts)
-    points = tuple(world_points(part, s) for part, s in zip(assembly.parts, solids, strict=True))
-    everything = np.concatenate(points)
-    return Drawing(assembly, solids, points, float(np.linalg.norm(np.ptp(everything, axis=0))))
 
 
 def _edge_color(color: RGB) -> RGB:
@@ -143,85 +106,6 @@ def outline(drawing: Drawing, points: tuple[Array, ...]) -> Lines:
     )
 
 
-def _nice(value: float) -> float:
-    """Return a round number not above `value`: 1, 1.5, 2, 3, 5 or 7 times a power of ten."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(power * max(m for m in (1.0, 1.5, 2.0, 3.0, 5.0, 7.0) if m * power <= value))
-
-
-def deformed_points(
-    report: RigidityReport, drawing: Drawing, twists: Array, scale: float
-) -> tuple[Array, ...]:
-    """Return the world points of each part, moved by `scale` times the worst mode at 1 N."""
-    moved = []
-    per_newton = 1.0 / report.modes[0].value
-    for k, (part, where) in enumerate(zip(report.assembly.parts, drawing.points, strict=True)):
-        center = part.centroid
-        points = move_rigidly(where, center, scale * twists[k])
-        if k in report.node_points:
-            nodes = np.asarray(report.node_points[k])
-            whole = per_newton * np.asarray(report.node_displacements[k])
-            points = points + scale * bend_field(where, center, twists[k], nodes, whole)
-        moved.append(points)
-    return tuple(moved)
-
-
-def _furthest(report: RigidityReport, drawing: Drawing, twists: Array) -> float:
-    """Return how far the furthest point goes at 1 N (m), to first order."""
-    best = 0.0
-    for k, (part, where) in enumerate(zip(report.assembly.parts, drawing.points, strict=True)):
-        arms = where - part.centroid
-        way = twists[k, :3] + np.cross(twists[k, 3:], arms)
-        best = max(best, float(np.linalg.norm(way, axis=1).max()))
-    return best
-
-
-def _sample_pairs(report: RigidityReport, field: WorstField) -> list[tuple[int, int]]:
-    """Return (part, sample) pairs where arrows may stand: both ends of each part of structure."""
-    parts = report.assembly.parts
-    members = report.components[0].parts
-    frames = [k for k in members if not parts[k].fastener] or list(members)
-    chosen = []
-    for k in frames:
-        mine = np.flatnonzero(field.parts == k)
-        if not len(mine):
-            continue
-        where = field.points[mine]
-        _, _, vt = np.linalg.svd(where - where.mean(axis=0), full_matrices=False)
-        along = (where - where.mean(axis=0)) @ vt[0]
-        chosen += [(k, int(mine[i])) for i in sorted({int(along.argmin()), int(along.argmax())})]
-    return chosen
-
-
-def _load_arrows(
-    report: RigidityReport, drawing: Drawing, field: WorstField, scale: float
-) -> tuple[Surface | None, float]:
-    """Return the arrows of the worst-case load and the largest load per mass (N/kg).
-
-    The load on material is in proportion to how far the material goes. Arrows end at the points that
-    they push, and stand on the deformed shape.
-    """
-    pairs = _sample_pairs(report, field)
-    sizes = {i: float(np.linalg.norm(field.displacements[i])) for _, i in pairs}
-    largest = max(sizes.values(), default=0.0)
-    if largest == 0.0:
-        return None, 0.0
-    order = sorted((i for i in sizes if sizes[i] >= _FAINT * largest), key=lambda i: (-sizes[i], i))
-    pieces: list[Surface] = []
-    starts: list[Array] = []
-    for i in order:
-        start = field.points[i] + scale * field.displacements[i]
-        vector = field.displacements[i] / largest * _ARROW_SHARE * drawing.diagonal
-        # Arrows closer than this run into each other; the larger one speaks for both.
-        if any(np.linalg.norm(start - other) < _APART * drawing.diagonal for other in starts):
-            continue
-        starts.append(start)
-        pieces.append(arrow(start, vector, _ARROW_RADIUS * drawing.diagonal, LOAD_COLOR))
-        if len(pieces) == _ARROWS:
-            break
-    return merge(pieces, on_top=True), largest * field.load_per_mass
-
-
 def _spot_markers(report: RigidityReport, points: tuple[Array, ...]) -> tuple[Marker, ...]:
     markers = []
     for spot in report.weak_spots[:_SPOTS]:
@@ -257,13 +141,13 @@ def _elastic_panel(
     if load is None:
         return None
     _, twists = load
-    furthest = _furthest(report, drawing, twists)
+    furthest = furthest_way(report, drawing, twists)
     if furthest == 0.0:
         return None
-    scale = _nice(_DEFORMED_SHARE * drawing.diagonal / furthest)
+    scale = deformation_scale(drawing, furthest)
     moved = deformed_points(report, drawing, twists, scale)
     body, edges = model_layers(drawing, moved)
-    arrows, largest = _load_arrows(report, drawing, field, scale)
+    arrows, largest = load_arrows(report, drawing, field, scale)
     surfaces = (body,) if arrows is None else (body, arrows)
     extent = np.concatenate([*drawing.points, *(surface.points for surface in surfaces)])
     panel = Panel(

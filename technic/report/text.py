@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from math import inf
-from typing import Any
 
 import numpy as np
 
 from technic.assembly.model import FindingKind
 from technic.report.bodies import moving_groups
 from technic.report.pattern import describe_field
+from technic.report.phrases import FINDING_WORDS, merged_stiffness, motion_words
 from technic.report.style import Style
 from technic.report.wording import (
     DIRECTION_WORDS,
@@ -23,7 +23,8 @@ from technic.report.wording import (
     spot_words,
 )
 from technic.report.worst_field import worst_field
-from technic.rigidity.result import Motion, MotionKind, RigidityReport, Verdict
+from technic.rigidity.result import MotionKind, RigidityReport, Verdict
+from technic.rigidity.sentences import import_effects
 from technic.rigidity.serialize import joint_stiffness, size_mm, spot_place
 from technic.units import MM
 
@@ -35,9 +36,6 @@ _SPOTS_SHOWN = 5
 _FINDINGS_SHOWN = 3
 """Longer lists are in the JSON report; a person acts on the first few."""
 
-_SENTENCE = 320
-"""Letters of a motion's sentence: in a big mechanism dozens of parts follow one another."""
-
 _PUSHED = 0.5
 """Parts that go at least this share of the furthest way are named in the softest direction."""
 
@@ -48,23 +46,6 @@ _VERDICTS = {
     Verdict.FLEXIBLE: ("bad", "FLEXIBLE"),
     Verdict.DISCONNECTED: ("bad", "DISCONNECTED"),
     Verdict.UNDETERMINED: ("warn", "UNDETERMINED"),
-}
-
-_ORDERS = {
-    "finite": "A real mechanism: it keeps moving",
-    "first-order": "Shaky: moves a little through pin play, not a mechanism",
-}
-
-_FINDING_WORDS = {
-    FindingKind.OFF_GRID: ("joint placed off the grid", "joints placed off the grid"),
-    FindingKind.NEAR_MISS: ("near miss", "near misses"),
-    FindingKind.OPEN_PORT: ("open pin or axle end", "open pin or axle ends"),
-    FindingKind.SINGLE_PIN: ("part on a single pin", "parts on a single pin"),
-    FindingKind.ONE_PART_PIN: ("pin in one part only", "pins in one part only"),
-    FindingKind.NO_PIN: ("pair of aligned holes with no pin", "pairs of aligned holes with no pin"),
-    FindingKind.LOOSE: ("loose part", "loose parts"),
-    FindingKind.FLEXIBLE: ("flexible item, not modelled", "flexible items, not modelled"),
-    FindingKind.WARNING: ("warning", "warnings"),
 }
 
 
@@ -120,21 +101,6 @@ def _bodies(report: RigidityReport, style: Style) -> list[str]:
     return lines
 
 
-def _sentence(report: RigidityReport, motion: Motion) -> str:
-    said = motion.sentence or (
-        f"{part_names(report.assembly, motion.parts)} can move ({motion.type.value})"
-    )
-    clauses = said.rstrip(".").split("; ")
-    kept = 1
-    while kept < len(clauses) and len("; ".join(clauses[: kept + 1])) <= _SENTENCE:
-        kept += 1
-    if kept < len(clauses):
-        clauses[kept:] = ["and others with them, see --json"]
-    # That a wheel keeps spinning goes without saying.
-    order = _ORDERS.get(motion.order or "") if motion.kind is MotionKind.STRUCTURAL else None
-    return "; ".join(clauses) + (f". {order}." if order else ".")
-
-
 def _motions(report: RigidityReport, style: Style) -> list[str]:
     by_kind = {
         kind: [motion for motion in report.motions if motion.kind is kind] for kind in MotionKind
@@ -148,7 +114,7 @@ def _motions(report: RigidityReport, style: Style) -> list[str]:
             style("bold", f"What moves: {qualifier}{count(mobility.structural, 'motion')}"),
         ]
         for n, motion in enumerate(structural[:_STRUCTURAL_SHOWN], 1):
-            lines += style.wrap(_sentence(report, motion), f" {n:2d}. ", "     ")
+            lines += style.wrap(motion_words(report, motion), f" {n:2d}. ", "     ")
         if len(structural) > _STRUCTURAL_SHOWN:
             lines.append("     " + _more(len(structural) - _STRUCTURAL_SHOWN))
         lines += style.wrap(
@@ -164,7 +130,7 @@ def _motions(report: RigidityReport, style: Style) -> list[str]:
             continue
         lines += ["", style("bold", f"{word}: {total}")]
         for motion in motions[:_HARMLESS_SHOWN]:
-            lines += style.wrap(_sentence(report, motion), "   - ", "     ")
+            lines += style.wrap(motion_words(report, motion), "   - ", "     ")
         if len(motions) > _HARMLESS_SHOWN:
             lines.append("     " + _more(len(motions) - _HARMLESS_SHOWN))
     if mobility.idle:
@@ -275,6 +241,24 @@ def _unknown(report: RigidityReport, style: Style) -> list[str]:
     return lines
 
 
+def _imported(report: RigidityReport, style: Style) -> list[str]:
+    imported = report.assembly.imported
+    effects = import_effects(report.assembly)
+    if imported is None or not effects:
+        return []
+    read = sum(part.count for part in imported.from_library)
+    unknown = sum(part.count for part in report.assembly.unknown)
+    lines = ["", style("bold", "Where the parts come from")]
+    lines.append(f"   {imported.catalogue} known, {read} from the parts library, {unknown} unknown")
+    if imported.library:
+        release = f" (release {imported.release})" if imported.release else ""
+        shadow = f", connectors also from {imported.shadow}" if imported.shadow else ""
+        lines += style.wrap(f"library: {imported.library}{release}{shadow}", "   ", "      ")
+    for sentence in effects:
+        lines += style.wrap(sentence, "   - ", "     ")
+    return lines
+
+
 def _findings(report: RigidityReport, style: Style) -> list[str]:
     findings = report.assembly.findings
     if not findings:
@@ -284,7 +268,7 @@ def _findings(report: RigidityReport, style: Style) -> list[str]:
     for kind in FindingKind:
         if not numbers[kind]:
             continue
-        singular, plural = _FINDING_WORDS[kind]
+        singular, plural = FINDING_WORDS[kind]
         lines.append(f"   {count(numbers[kind], singular, plural)}")
         if kind is FindingKind.OPEN_PORT:
             continue  # most open ends are meant to be open: only counted
@@ -305,7 +289,7 @@ def _assumptions(report: RigidityReport, style: Style) -> list[str]:
         lines += ["", style("bold", "Not modelled")]
         for item in report.not_modelled:
             lines += style.wrap(item, "   - ", "     ")
-    entries = _merged(joint_stiffness(report.assembly))
+    entries = merged_stiffness(joint_stiffness(report.assembly))
     if entries:
         lines += ["", style("bold", "Joints and where their stiffness comes from")]
     for (name, kind, source), (total, values) in entries.items():
@@ -319,28 +303,6 @@ def _assumptions(report: RigidityReport, style: Style) -> list[str]:
             f"{total} x {name} ({kind}): {', '.join(said)}; source: {source}", "   ", "      "
         )
     return lines
-
-
-def _merged(
-    entries: list[dict[str, Any]],
-) -> dict[tuple[str, str, str], tuple[int, dict[str, list[float]]]]:
-    """Return the joints by connection, type and source, with all values that occur.
-
-    Joints of several studs have a stiffness each; a reader wants the range.
-    """
-    merged: dict[tuple[str, str, str], tuple[int, dict[str, list[float]]]] = {}
-    for entry in entries:
-        key = (
-            entry["connection"] or entry["type"],
-            entry["type"],
-            entry["provenance"] or "not stated",
-        )
-        total, values = merged.get(key, (0, {}))
-        for motion, value in entry["values"].items():
-            found = value if isinstance(value, list) else [value]
-            values.setdefault(motion, []).extend(inf if v == "rigid" else v for v in found)
-        merged[key] = (total + entry["count"], values)
-    return merged
 
 
 def to_text(report: RigidityReport, style: Style | None = None) -> str:
@@ -361,6 +323,7 @@ def to_text(report: RigidityReport, style: Style | None = None) -> str:
         _rigidity,
         _weak_spots,
         _unknown,
+        _imported,
         _findings,
         _assumptions,
     ):
