@@ -16,7 +16,7 @@ from typing import Annotated
 import typer
 
 from technic import __version__
-from technic.commands import analyze, demo, parts
+from technic.commands import analyze, deflect, demo, parts, suggest
 from technic.errors import TechnicError
 
 __all__ = ["app", "main"]
@@ -32,7 +32,9 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("analyze")(analyze.analyze)
+app.command("deflect")(deflect.deflect)
 app.command("demo")(demo.demo)
+app.command("suggest")(suggest.suggest)
 app.add_typer(parts.app, name="parts")
 
 

@@ -12,17 +12,21 @@ import typer
 from technic.commands.options import (
     AnalysisOptions,
     AxleSlideOption,
+    CalibrationOption,
     FixOption,
     JsonOption,
+    LibraryOption,
     MeasureOption,
     MinRigidityOption,
     ModesOption,
+    NoLibraryOption,
     PartModelOption,
     PictureOption,
     QuietOption,
     RequireRigidOption,
+    ShadowOption,
 )
-from technic.errors import UsageError
+from technic.commands.reading import LibraryOptions, reading
 
 if TYPE_CHECKING:
     from technic.rigidity.result import RigidityReport
@@ -62,15 +66,6 @@ def _demands(report: RigidityReport, options: AnalysisOptions) -> list[str]:
     return missed
 
 
-def _reading(model: Path, options: AnalysisOptions) -> dict[str, str]:
-    """Return the options of the reader: an assembly file says itself what its joints hold."""
-    if model.suffix.lower() != ".json":
-        return {"axle_slide": options.axle_slide}
-    if options.axle_slide != "held":
-        raise UsageError("--axle-slide is for LDraw models; an assembly file types its joints")
-    return {}
-
-
 def run(model: Path, options: AnalysisOptions) -> None:
     """Load, analyze and report, as `technic analyze` and `technic demo` do.
 
@@ -94,7 +89,8 @@ def run(model: Path, options: AnalysisOptions) -> None:
         # The drawing program starts while the analysis runs.
         painter = Painter()
     try:
-        assembly = load(model, **_reading(model, options))
+        libraries = LibraryOptions(options.library, options.no_library, options.shadow)
+        assembly = load(model, **reading(model, options.axle_slide, options.calibration, libraries))
         if options.fix:
             supports = tuple(parse_fix(assembly, text) for text in options.fix)
             assembly = replace(assembly, supports=assembly.supports + supports)
@@ -135,6 +131,10 @@ def analyze(
     fix: FixOption = None,
     measure: MeasureOption = "mean_square",
     axle_slide: AxleSlideOption = "held",
+    calibration: CalibrationOption = None,
+    library: LibraryOption = None,
+    no_library: NoLibraryOption = False,
+    shadow: ShadowOption = None,
     modes: ModesOption = 6,
     parts: PartModelOption = "frame",
     require_rigid: RequireRigidOption = False,
@@ -150,6 +150,10 @@ def analyze(
             fix=tuple(fix or ()),
             measure=measure,
             axle_slide=axle_slide,
+            calibration=calibration,
+            library=library,
+            no_library=no_library,
+            shadow=shadow,
             modes=modes,
             parts=parts,
             require_rigid=require_rigid,

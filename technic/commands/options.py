@@ -12,17 +12,21 @@ __all__ = [
     "AnalysisOptions",
     "AxleSlide",
     "AxleSlideOption",
+    "CalibrationOption",
     "FixOption",
     "JsonOption",
+    "LibraryOption",
     "Measure",
     "MeasureOption",
     "MinRigidityOption",
     "ModesOption",
+    "NoLibraryOption",
     "PartModel",
     "PartModelOption",
     "PictureOption",
     "QuietOption",
     "RequireRigidOption",
+    "ShadowOption",
 ]
 
 
@@ -57,6 +61,34 @@ AxleSlideOption = Annotated[
     AxleSlide,
     typer.Option("--axle-slide", help="Axles in axle holes: held by friction, or free to slide."),
 ]
+CalibrationOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--calibration",
+        metavar="TOML",
+        help="Stiffness table from `technic calibrate`, used instead of the shipped one.",
+    ),
+]
+LibraryOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--library",
+        metavar="DIR|ZIP",
+        help="LDraw parts library, for parts that the catalogue does not have. Left out: LDRAWDIR, "
+        "or the usual places.",
+    ),
+]
+NoLibraryOption = Annotated[
+    bool, typer.Option("--no-library", help="Do not use a parts library, even if there is one.")
+]
+ShadowOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--shadow",
+        metavar="DIR|ZIP",
+        help="LDCad shadow library: connectors of the library's parts. Left out: TECHNIC_SHADOW.",
+    ),
+]
 ModesOption = Annotated[
     int, typer.Option("--modes", min=1, max=200, metavar="K", help="How many elastic modes.")
 ]
@@ -88,6 +120,10 @@ class AnalysisOptions:
     fix: tuple[str, ...] = ()
     measure: Measure = "mean_square"
     axle_slide: AxleSlide = "held"
+    calibration: Path | None = None
+    library: Path | None = None
+    no_library: bool = False
+    shadow: Path | None = None
     modes: int = 6
     parts: PartModel = "frame"
     require_rigid: bool = False
