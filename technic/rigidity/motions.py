@@ -69,7 +69,7 @@ def sort_motions(kin: Kinematics, motions: ComponentMotions, component: int) -> 
         kin,
         motions,
         clusters,
-        [(c, m) for kind, c, m in local if kind is not MotionKind.IDLE],
+        [(c, m) for _, c, m in local],
         grounded=grounded,
     )
     structural = split_by_order(kin, motions, component, space)

@@ -31,7 +31,7 @@ class StructuralSpace:
     basis : (6 * len(bodies), s) ndarray
         Orthonormal.
     removed : (6 * len(bodies), r) ndarray
-        Spinning and sliding of single clusters, orthonormal, taken out of `basis`.
+        Spinning, sliding and idling of single clusters, orthonormal, taken out of `basis`.
     field : (6 * len(bodies), k) ndarray
         The same clusters in every motion of the component, the main body standing still (unless the
         component is grounded).
@@ -85,7 +85,7 @@ def structural_space(
     clusters : list of Cluster
         Main body first.
     local : list of (Cluster, LocalMotion)
-        Spinning and sliding motions, which are not structural.
+        Spinning, sliding and idle motions, which are not structural.
     grounded : bool
         The component has a support; then the main body may move too.
     """
@@ -101,6 +101,10 @@ def structural_space(
         if id(cluster) in own:
             column = np.zeros((len(bodies), 6))
             column[own[id(cluster)]] = motion.twist
+            if cluster is clusters[0] and not grounded:
+                # a rod that turns about itself: seen from it, everything else turns
+                column = (shift_twist(arms) @ motion.twist)[bodies]
+                column[own[id(cluster)]] = 0.0
             removed = np.column_stack([removed, column.ravel()])
     removed, _ = np.linalg.qr(removed)
     rest = flat - removed @ (removed.T @ flat)
