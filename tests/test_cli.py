@@ -325,3 +325,53 @@ def test_demo_without_picture(run, tmp_path, monkeypatch):
     assert code == 0
     assert json.loads(out)["model"]["parts"] == 153
     assert not list(tmp_path.iterdir())
+
+
+# --- parts library ----------------------------------------------------------------------------
+
+
+def test_parts_of_a_library_are_used_and_said(run, tmp_path, monkeypatch):
+    from tests.ldraw.small_library import files_with, line, part, write_folder
+
+    monkeypatch.delenv("LDRAWDIR", raising=False)
+    monkeypatch.delenv("TECHNIC_SHADOW", raising=False)
+    monkeypatch.setenv("TECHNIC_DATA", str(tmp_path / "data"))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    files = files_with({"parts/xbeam.dat": part(line("connhole.dat"), title="Odd Beam")})
+    library = write_folder(tmp_path / "library", files)
+    model = tmp_path / "odd.ldr"
+    odd = "1 4 0 -20 40 1 0 0 0 1 0 0 0 1 xbeam.dat"
+    model.write_text("\n".join([BEAM.format(y=0), PIN.format(z=40), odd, ""]))
+
+    code, out, _ = run("analyze", model)
+    assert code == 0
+    assert "1 x xbeam: no definition" in out
+    assert "technic parts fetch" in " ".join(out.split())
+
+    code, out, _ = run("analyze", model, "--library", library)
+    assert code == 0
+    assert f"library: {library} (release 2026-02)" in " ".join(out.split())
+    assert "2 known, 1 from the parts library, 0 unknown" in out
+
+    monkeypatch.setenv("LDRAWDIR", str(library))
+    code, out, _ = run("analyze", model, "--json", "-")
+    content = json.loads(out)["model"]
+    assert content["unknown_parts"] == []
+    assert content["import"]["from_library"] == 1
+    assert content["import"]["library_parts"][0]["id"] == "xbeam"
+
+    _, out, _ = run("analyze", model, "--no-library", "--json", "-")
+    content = json.loads(out)["model"]
+    assert content["import"]["library"] is None
+    assert content["import"]["unknown"] == 1
+    assert any("leave --no-library out" in sentence for sentence in content["import"]["effect"])
+
+
+def test_contradicting_and_missing_libraries(run, pair, tmp_path, monkeypatch):
+    monkeypatch.delenv("LDRAWDIR", raising=False)
+    monkeypatch.setenv("TECHNIC_DATA", str(tmp_path / "data"))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert run("analyze", pair, "--no-library", "--library", tmp_path)[0] == 2
+    assert run("analyze", pair, "--shadow", tmp_path)[0] == 2
+    assert run("analyze", pair, "--library", tmp_path / "missing")[0] == 4
+    assert run("analyze", pair, "--library", pair)[0] == 3

@@ -17,6 +17,8 @@ __all__ = [
     "Assembly",
     "Finding",
     "FindingKind",
+    "ImportSummary",
+    "ImportedPart",
     "Joint",
     "Part",
     "Source",
@@ -215,6 +217,43 @@ class UnknownPart:
         return len(self.lines)
 
 
+@dataclass(frozen=True, slots=True)
+class ImportedPart:
+    """A kind of part that was read from the parts library, with how many there are of it."""
+
+    number: str
+    title: str
+    count: int
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class ImportSummary:
+    """Where the parts of a model file came from.
+
+    Parameters
+    ----------
+    library, release : str
+        Place and release of the LDraw parts library that parts were read from; empty when none was
+        needed or none was there.
+    shadow : str
+        Place of the LDCad shadow library, or empty.
+    searched : bool
+        Whether a library was looked for at all.
+    catalogue : int
+        Parts with a definition of ours.
+    from_library : tuple of ImportedPart
+        The most frequent first.
+    """
+
+    library: str = ""
+    release: str = ""
+    shadow: str = ""
+    searched: bool = False
+    catalogue: int = 0
+    from_library: tuple[ImportedPart, ...] = ()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Assembly:
     """Parts, joints and supports, with what was found while reading them.
@@ -231,6 +270,8 @@ class Assembly:
     findings : tuple of Finding
     source : dict
         ``path``, ``sha256``, ``format`` ("ldraw" or "assembly"); empty when built in Python.
+    imported : ImportSummary or None
+        None for what is no LDraw model.
     """
 
     name: str
@@ -241,6 +282,7 @@ class Assembly:
     unknown: tuple[UnknownPart, ...] = ()
     findings: tuple[Finding, ...] = ()
     source: dict[str, Any] = field(default_factory=dict)
+    imported: ImportSummary | None = None
 
     def index(self, part_id: str) -> int:
         """Return the index of the part with this id; KeyError if there is none."""

@@ -12,7 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from technic.ldraw.library import Library
+from technic.errors import InputError
+from technic.ldraw.library import LIBRARY_FAMILY, Library
 from technic.ldraw.primitives import ports_from_primitives
 from technic.ldraw.shadow import ShadowLibrary
 from technic.ldraw.shadow_ports import ports_from_shadow
@@ -22,8 +23,6 @@ from technic.parts.materials import material
 from technic.units import PITCH
 
 __all__ = ["definition_from_library", "is_fastener", "mass_of"]
-
-FAMILY: Final = "library"
 
 CLOSED: Final = 0.03
 """Largest gap of a surface (see `SurfaceIntegrals`) whose enclosed volume is trusted: of 244 Technic
@@ -59,12 +58,14 @@ def definition_from_library(
     Raises
     ------
     InputError
-        The part's files are broken or absurdly big.
+        The part's files are broken, absurdly big, or draw no surface: such a part has no mass.
     """
     resolved = library.resolve(number)
     surface = surface_of(library, number, fine=False)
     if resolved is None or surface is None:
         return None
+    if not len(surface.triangles):
+        raise InputError("it draws no surface", path=library.where(resolved.key))
     ports = None if shadow is None else ports_from_shadow(library, shadow, number)
     origin = "ports from the LDCad shadow library"
     if ports is None:
@@ -75,7 +76,7 @@ def definition_from_library(
     return PartDefinition(
         id=number.lower().removesuffix(".dat"),
         title=title,
-        family=FAMILY,
+        family=LIBRARY_FAMILY,
         ports=ports,
         body=RigidBody(),
         mass_properties=mass,

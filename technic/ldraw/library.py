@@ -22,9 +22,10 @@ import numpy as np
 
 from technic.errors import InputError, MissingDependency
 from technic.geometry import Array, readonly
-from technic.ldraw.storage import Store, open_store
+from technic.ldraw.storage import Store, data_folder, open_store
 
 __all__ = [
+    "LIBRARY_FAMILY",
     "Library",
     "PartFile",
     "Reference",
@@ -36,6 +37,9 @@ __all__ = [
 
 FOLDERS: Final = ("parts/", "p/", "models/", "unofficial/parts/", "unofficial/p/")
 """Folders of a library in the order in which a reference is looked up."""
+
+LIBRARY_FAMILY: Final = "library"
+"""Family of every definition that is made from library files."""
 
 MAX_MOVES: Final = 16
 """Longest chain of moved-to stubs that is followed; real ones have at most three links."""
@@ -141,10 +145,14 @@ class Library:
     Parameters
     ----------
     stores : sequence of Store
+    main : int
+        Which of them is the library itself; others come before it (parts that a model draws) or
+        after it (unofficial parts).
     """
 
-    def __init__(self, stores: Sequence[Store]) -> None:
+    def __init__(self, stores: Sequence[Store], main: int = 0) -> None:
         self.stores = tuple(stores)
+        self._main = main
         self._files: dict[str, PartFile] = {}
         self.memo: dict[str, object] = {}
         """For modules that derive something from the library and want to keep it as long."""
@@ -165,8 +173,8 @@ class Library:
 
     @property
     def path(self) -> Path:
-        """The first place of the library."""
-        return self.stores[0].path
+        """The main place of the library."""
+        return self.stores[self._main].path
 
     def __len__(self) -> int:
         """Return the number of files."""
@@ -334,6 +342,7 @@ def candidate_folders() -> tuple[Path, ...]:
     places = []
     if os.environ.get("LDRAWDIR"):
         places.append(Path(os.environ["LDRAWDIR"]))
+    places.append(data_folder() / "ldraw")
     places += [home / "ldraw", home / ".ldraw", home / "LDraw", Path("/usr/share/ldraw")]
     if sys.platform == "darwin":
         places += [
@@ -356,7 +365,8 @@ def candidate_folders() -> tuple[Path, ...]:
 def find_library(explicit: str | Path | None = None) -> Library | None:
     """Return the parts library to use, or None when there is none.
 
-    The order is: `explicit`, the environment variable ``LDRAWDIR``, ``~/ldraw``, ``~/.ldraw``,
+    The order is: `explicit`, the environment variable ``LDRAWDIR``, what
+    `technic parts fetch` brought, ``~/ldraw``, ``~/.ldraw``,
     ``/usr/share/ldraw``, Studio's folder. What is named explicitly or by ``LDRAWDIR`` must work.
 
     Raises

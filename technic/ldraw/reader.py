@@ -6,25 +6,31 @@ something flexible, and the assembly lists all three.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from technic.assembly.model import Assembly, Finding, FindingKind, Part, Source, UnknownPart
+from technic.assembly.model import (
+    Assembly,
+    Finding,
+    FindingKind,
+    ImportedPart,
+    ImportSummary,
+    Part,
+    Source,
+    UnknownPart,
+)
 from technic.assembly.stiffness import StiffnessTable, default_table
-from technic.errors import InputError, UsageError
+from technic.errors import InputError
 from technic.geometry import Pose
 from technic.ldraw.connect import AxleSlide, connect
 from technic.ldraw.document import Document, Placement, placements, poses, read
-from technic.parts.catalogue import catalogue
+from technic.ldraw.finder import LibrarySource, PartFinder, ShadowSource
+from technic.ldraw.library import LIBRARY_FAMILY
 from technic.parts.definition import PartDefinition
 
-if TYPE_CHECKING:
-    from technic.ldraw.library import Library
-    from technic.ldraw.shadow import ShadowLibrary
-
-__all__ = ["Reading", "load_ldraw", "read_parts"]
+__all__ = ["Reading", "load_ldraw", "lookup", "read_parts"]
 
 Lookup = Callable[[str], tuple[PartDefinition, Pose] | None]
 
@@ -60,8 +66,8 @@ def load_ldraw(
     *,
     axle_slide: AxleSlide = "held",
     table: StiffnessTable | None = None,
-    library: Library | None = None,
-    shadow: ShadowLibrary | None = None,
+    library: LibrarySource = None,
+    shadow: ShadowSource = None,
 ) -> Assembly:
     """Read an LDraw model and find its connections.
 
@@ -73,9 +79,10 @@ def load_ldraw(
         Whether parts that grip an axle stay where they are on it.
     table : StiffnessTable, optional
         Default: the shipped one.
-    library : Library, optional
-        LDraw parts library for parts that the catalogue does not have.
-    shadow : ShadowLibrary, optional
+    library : Library or callable, optional
+        LDraw parts library for parts that the catalogue does not have, or a function that opens it,
+        called when the first such part is met.
+    shadow : ShadowLibrary or callable, optional
         LDCad shadow library: connectors of the library's parts.
 
     Returns
@@ -87,18 +94,19 @@ def load_ldraw(
     InputError
         The file cannot be understood, or has no part that is known.
     """
-    reading = read_parts(read(path), lookup(library, shadow))
+    document = read(path)
+    find = PartFinder(library, shadow, document)
+    reading = read_parts(document, find, find.refused)
     if not reading.parts:
         raise InputError(
             _nothing_known(reading),
             path=path,
             line=reading.placements[0].line,
             remedy="Give an LDraw parts library, from which unknown parts can be read."
-            if library is None
+            if find.library is None
             else "The parts library does not have them either.",
         )
     joints, findings = connect(reading.parts, table or default_table(), axle_slide=axle_slide)
-    document = reading.document
     return Assembly(
         name=Path(document.main.name).stem,
         parts=reading.parts,
@@ -106,33 +114,40 @@ def load_ldraw(
         unknown=reading.unknown,
         findings=(*reading.findings, *findings),
         source={"path": str(path), "sha256": document.sha256, "format": "ldraw"},
+        imported=_summary(reading.parts, find, searched=library is not None),
     )
 
 
-def lookup(library: Library | None = None, shadow: ShadowLibrary | None = None) -> Lookup:
-    """Return the function that finds a part: in the catalogue, else in the library when given."""
-    shipped = catalogue()
-    if library is None and shadow is not None:
-        raise UsageError("the shadow library adds to an LDraw library: give that too")
-    if library is None:
-        return shipped.resolve
-    from technic.ldraw.imported import definition_from_library
-
-    found: dict[str, tuple[PartDefinition, Pose] | None] = {}
-
-    def resolve(number: str) -> tuple[PartDefinition, Pose] | None:
-        if number not in found:
-            entry = shipped.resolve(number)
-            if entry is None:
-                made = definition_from_library(library, number, shadow=shadow)
-                entry = None if made is None else (made, Pose.identity())
-            found[number] = entry
-        return found[number]
-
-    return resolve
+def lookup(library: LibrarySource = None, shadow: ShadowSource = None) -> PartFinder:
+    """Return what finds a part: in the catalogue, else in the library when given."""
+    return PartFinder(library, shadow)
 
 
-def read_parts(document: Document, find: Lookup) -> Reading:
+def _summary(parts: tuple[Part, ...], find: PartFinder, *, searched: bool) -> ImportSummary:
+    counts: Counter[str] = Counter()
+    definitions: dict[str, PartDefinition] = {}
+    for part in parts:
+        assert part.definition is not None  # the reader gives every part one
+        if part.definition.family == LIBRARY_FAMILY:
+            counts[part.definition.id] += 1
+            definitions[part.definition.id] = part.definition
+    library = find.library
+    return ImportSummary(
+        library="" if library is None else str(library.path),
+        release="" if library is None else library.release(),
+        shadow="" if find.shadow is None else str(find.shadow.store.path),
+        searched=searched,
+        catalogue=len(parts) - counts.total(),
+        from_library=tuple(
+            ImportedPart(number, definitions[number].title, count, definitions[number].source)
+            for number, count in sorted(counts.items(), key=lambda item: (-item[1], item[0]))
+        ),
+    )
+
+
+def read_parts(
+    document: Document, find: Lookup, refused: Mapping[str, str] | None = None
+) -> Reading:
     """Return the parts of a document, and everything in it that is none.
 
     Parameters
@@ -141,6 +156,8 @@ def read_parts(document: Document, find: Lookup) -> Reading:
     find : callable
         From a part number to its definition and the pose of the definition's frame in the frame of
         that number; None for an unknown one.
+    refused : mapping, optional
+        Why parts are unknown although there is a file of theirs; read after all were looked up.
     """
     placed = placements(document, lambda number: find(number) is not None)
     solid = [placement for placement in placed if placement.flexible is None]
@@ -161,7 +178,7 @@ def read_parts(document: Document, find: Lookup) -> Reading:
         tuple(placed),
         tuple(parts),
         tuple(
-            UnknownPart(number, tuple(p.line for p in group), _reason(group[0]))
+            UnknownPart(number, tuple(p.line for p in group), _reason(group[0], refused))
             for number, group in sorted(unknown.items(), key=lambda item: (-len(item[1]), item[0]))
         ),
         placed.flexible,
@@ -185,7 +202,9 @@ def _part(placement: Placement, definition: PartDefinition, inner: Pose, pose: P
     )
 
 
-def _reason(placement: Placement) -> str:
+def _reason(placement: Placement, refused: Mapping[str, str] | None) -> str:
+    if refused and placement.number in refused:
+        return refused[placement.number]
     if placement.missing:
         return "submodel not found"
     if placement.embedded is not None:

@@ -20,7 +20,7 @@ from typing import Final, Protocol
 
 from technic.errors import InputError
 
-__all__ = ["FolderStore", "Store", "ZipStore", "cache_folder", "open_store"]
+__all__ = ["FolderStore", "Store", "ZipStore", "cache_folder", "data_folder", "open_store"]
 
 MAX_FILE: Final = 32 * 2**20
 """Largest file that is read (bytes); the largest official part has 3 MB."""
@@ -66,6 +66,16 @@ def cache_folder() -> Path:
     import platformdirs
 
     return Path(platformdirs.user_cache_dir("technic-rigidity", appauthor=False))
+
+
+def data_folder() -> Path:
+    """Return the folder for data that the user fetched: ``TECHNIC_DATA`` or the user's data folder."""
+    explicit = os.environ.get("TECHNIC_DATA")
+    if explicit:
+        return Path(explicit)
+    import platformdirs
+
+    return Path(platformdirs.user_data_dir("technic-rigidity", appauthor=False))
 
 
 def open_store(path: Path) -> Store:

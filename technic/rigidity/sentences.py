@@ -12,7 +12,7 @@ from technic.rigidity.screw import describe_twists
 from technic.tolerances import MOBILITY_LENGTH, MOTION_KIND_CUT, SAME_LINE
 from technic.units import MM
 
-__all__ = ["motion_sentence", "not_modelled", "part_label", "reason"]
+__all__ = ["import_effects", "motion_sentence", "not_modelled", "part_label", "reason"]
 
 GROUPS_SHOWN = 4
 """A sentence names at most this many bodies and parts; the report lists all."""
@@ -155,6 +155,32 @@ def reason(
         return "Nothing that carries structure can move against the rest."
     ways = "1 way" if mobility.structural == 1 else f"{mobility.structural} independent ways"
     return f"Parts that carry structure can move against the rest in {ways}."
+
+
+def import_effects(assembly: Assembly) -> tuple[str, ...]:
+    """Say what the origin of a model's parts means for the answer, one sentence each."""
+    imported, out = assembly.imported, []
+    if imported is None:
+        return ()
+    missing = sum(u.count for u in assembly.unknown)
+    if missing:
+        out.append(
+            f"{_parts(missing)} left out may join what seems loose here, and may move themselves: "
+            "the motions counted are those of the rest."
+        )
+        if not imported.library:
+            out.append(
+                "With an LDraw parts library their connectors would be read from their drawings: "
+                "`technic parts fetch` downloads it"
+                + ("." if imported.searched else ", or leave --no-library out.")
+            )
+    read = sum(part.count for part in imported.from_library)
+    if read:
+        out.append(
+            f"{_parts(read)} from the library are taken as rigid bodies: of them, the rigidity "
+            "counts the joints, not their own bending."
+        )
+    return tuple(out)
 
 
 def not_modelled(assembly: Assembly) -> tuple[str, ...]:

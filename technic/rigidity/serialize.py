@@ -29,6 +29,7 @@ from technic.rigidity.result import (
     RigidityReport,
     WeakSpot,
 )
+from technic.rigidity.sentences import import_effects
 from technic.units import LDU, MM
 
 __all__ = ["SCHEMA", "joint_stiffness", "size_mm", "spot_place", "to_dict", "unit_load"]
@@ -276,10 +277,37 @@ def _model(report: RigidityReport) -> dict[str, Any]:
             }
             for unknown in assembly.unknown
         ],
+        "import": _imported(report),
         "near_misses": details(FindingKind.NEAR_MISS),
         "open_ports": len(details(FindingKind.OPEN_PORT)),
         "open_port_list": details(FindingKind.OPEN_PORT),
         "warnings": details(*(kind for kind in FindingKind if kind not in apart)),
+    }
+
+
+def _imported(report: RigidityReport) -> dict[str, Any] | None:
+    """Return where the parts came from, and what that means for the verdict."""
+    imported = report.assembly.imported
+    if imported is None:
+        return None
+    return {
+        "library": imported.library or None,
+        "release": imported.release or None,
+        "shadow": imported.shadow or None,
+        "known": imported.catalogue,
+        "from_library": sum(part.count for part in imported.from_library),
+        "rigid_by_choice": sum(part.count for part in imported.from_library),
+        "unknown": sum(part.count for part in report.assembly.unknown),
+        "library_parts": [
+            {
+                "id": part.number,
+                "title": part.title,
+                "count": part.count,
+                "source": part.source,
+            }
+            for part in imported.from_library
+        ],
+        "effect": list(import_effects(report.assembly)),
     }
 
 

@@ -40,9 +40,13 @@ def part(*lines: str, title: str = "Part") -> str:
     return HEADER.format(title=title, name="x.dat") + "".join(lines)
 
 
+SQUARE = "4 16 -6 0 -6 6 0 -6 6 0 6 -6 0 6\r\n"
+"""A primitive's surface: a part without any has no mass."""
+
+
 def files_with(extra: Mapping[str, str]) -> dict[str, str]:
-    """`extra`, with empty files for the primitives that ports are read from."""
-    files = {f"p/{name}.dat": part(title=name) for name in PRIMITIVES}
+    """`extra`, with a square each for the primitives that ports are read from."""
+    files = {f"p/{name}.dat": part(SQUARE, title=name) for name in PRIMITIVES}
     for name in ("4-4cyli", "2-4cyli", "48/4-4cyli"):
         files[f"p/{name}.dat"] = part(title="Cylinder")
     return {**files, **extra}

@@ -246,11 +246,16 @@ def test_many_may_open_it_at_once(tmp_path, cache):
 def test_search_order(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.setenv("USERPROFILE", str(tmp_path / "home"))
+    monkeypatch.setenv("TECHNIC_DATA", str(tmp_path / "data"))
+    monkeypatch.delenv("LDRAWDIR", raising=False)
     (tmp_path / "home").mkdir()
-    home = candidate_folders()[0]
+    fetched, home = candidate_folders()[:2]
     assert home == tmp_path / "home" / "ldraw"
     write_folder(home, FILES)
     assert there(find_library()).path == home
+    fetched.mkdir(parents=True)
+    write_zip(fetched / "complete.zip", FILES, "ldraw/")
+    assert there(find_library()).path == tmp_path / "data" / "ldraw" / "complete.zip"
     other = write_folder(tmp_path / "other", FILES)
     monkeypatch.setenv("LDRAWDIR", str(other))
     assert there(find_library()).path == other
@@ -262,6 +267,8 @@ def test_search_order(tmp_path, monkeypatch):
 
 def test_a_zip_in_the_usual_place_is_found(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("TECHNIC_DATA", str(tmp_path / "data"))
+    monkeypatch.delenv("LDRAWDIR", raising=False)
     monkeypatch.setenv("USERPROFILE", str(tmp_path))
     (tmp_path / "ldraw").mkdir()
     write_zip(tmp_path / "ldraw" / "complete.zip", FILES, "ldraw/")
