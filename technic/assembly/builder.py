@@ -115,6 +115,12 @@ class Linkage:
         """Add a part from a mesh file."""
         self._part(name, {"kind": "mesh", "file": str(file), **options}, material)
 
+    def mark_fastener(self, name: str) -> None:
+        """Say that a part is a pin or the like: it joins others and carries no structure of its own."""
+        for row in self._data["parts"]:
+            if row["id"] == name:
+                row["fastener"] = True
+
     def _part(self, name: str, shape: Mapping[str, Any], material: str | None) -> None:
         row: dict[str, Any] = {"id": name, "shape": dict(shape)}
         if material is not None:

@@ -204,17 +204,14 @@ def _bar(
     spans = np.diff(corners, axis=0)
     normals = _normals(shape, spans, dimension)
     pieces = int(shape.get("elements", BAR_ELEMENTS))
-    points = [corners[:1]]
-    for p, span in zip(corners[:-1], spans, strict=True):
-        points.append(p + np.arange(1, pieces + 1)[:, None] / pieces * span)
-    nodes = np.vstack(points)
-    first = np.arange(len(nodes) - 1)
+    first = np.arange(len(lengths))
     body = FrameBody(
-        points=nodes,
+        points=corners,
         members=np.column_stack([first, first + 1]),
         sections=(section,) * len(first),
-        normals=np.repeat(normals, pieces, axis=0),
+        normals=normals,
         material=material,
+        max_stretch=lengths / pieces,
     )
     masses = material.density * section.area * lengths
     own = np.zeros((len(lengths), 3, 3))

@@ -23,6 +23,7 @@ from technic.geometry import Array, readonly
 __all__ = [
     "MOTIONS",
     "SCHEMA",
+    "SLOTS",
     "ConnectionStiffness",
     "StiffnessTable",
     "StiffnessValue",
@@ -35,7 +36,7 @@ SCHEMA: Final = "technic-stiffness/1"
 MOTIONS: Final = ("axial", "shear", "spin", "tilt")
 """Names of the values of a connection: N/m for the first two, N m/rad for the others."""
 
-_SLOTS: Final = {"axial": (0,), "shear": (1, 2), "spin": (3,), "tilt": (4, 5)}
+SLOTS: Final = {"axial": (0,), "shear": (1, 2), "spin": (3,), "tilt": (4, 5)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +90,7 @@ class ConnectionStiffness:
         """Return the six stiffnesses [axial, shear, shear, spin, tilt, tilt], 0 where none is given."""
         out = [0.0] * 6
         for motion, entry in self.values.items():
-            for slot in _SLOTS[motion]:
+            for slot in SLOTS[motion]:
                 out[slot] = entry.value
         return readonly(out)
 
@@ -99,7 +100,7 @@ class ConnectionStiffness:
         """
         origins: dict[str, list[str]] = {}
         for motion in MOTIONS:
-            if motion in self.values and held[_SLOTS[motion][0]]:
+            if motion in self.values and held[SLOTS[motion][0]]:
                 origins.setdefault(self.values[motion].provenance, []).append(motion)
         if len(origins) == 1:
             return next(iter(origins))
@@ -209,7 +210,7 @@ def _connection(key: str, entry: Any, faults: list[str]) -> ConnectionStiffness 
     found = {motion: value for motion, value in values.items() if value is not None}
     held = HELD[type_]
     for motion in MOTIONS:
-        if held[_SLOTS[motion][0]] and motion not in values:
+        if held[SLOTS[motion][0]] and motion not in values:
             faults.append(f"{where}.{motion}: missing, and a {type_} joint holds it")
     return ConnectionStiffness(key, type_, found)
 

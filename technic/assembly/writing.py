@@ -127,8 +127,7 @@ def _placed(shape: Mapping[str, Any], part: Part, dimension: int) -> dict[str, A
             points[k, : len(point)] = point
         out["points"] = [_numbers(p, dimension) for p in pose.points(points)]
     if isinstance(part.body, FrameBody):
-        pieces = len(part.body.members) // (len(shape["points"]) - 1)
-        normals = pose.directions(part.body.normals[::pieces])
+        normals = pose.directions(part.body.normals)
         out["normal"] = [_numbers(n) for n in normals]
     return out
 

@@ -102,6 +102,7 @@ def _subdivide(
     if not np.all(lengths > 0.0):
         raise InputError(f"frame member {int(np.argmin(lengths))} has no length")
     home, station = _project(starts, spans, lengths, attachments)
+    longest = np.broadcast_to(body.max_stretch, lengths.shape)
     nodes: list[Array] = [np.asarray(p) for p in body.points]
     node_of = [0] * len(attachments)
     pairs: list[tuple[int, int]] = []
@@ -124,7 +125,7 @@ def _subdivide(
                 node_of[k] = node
         chain.append((1.0, int(last)))
         for (s, a), (e, b) in pairwise(chain):
-            pieces = max(1, int(np.ceil((e - s) * lengths[m] / body.max_stretch - 1e-9)))
+            pieces = max(1, int(np.ceil((e - s) * lengths[m] / longest[m] - 1e-9)))
             inner = list(range(len(nodes), len(nodes) + pieces - 1))
             nodes += [starts[m] + (s + (e - s) * k / pieces) * spans[m] for k in range(1, pieces)]
             pairs += pairwise([a, *inner, b])

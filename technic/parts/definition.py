@@ -170,8 +170,8 @@ class FrameBody:
     normals : (m, 3) array_like
         Direction of each member's own z axis (made orthogonal to the member).
     material : Material
-    max_stretch : float
-        Members are divided into elements not longer than this (m).
+    max_stretch : float or (m,) array_like
+        Members are divided into elements not longer than this (m), or than each member's own.
     """
 
     points: Array
@@ -179,7 +179,7 @@ class FrameBody:
     sections: tuple[Section, ...]
     normals: Array
     material: Material
-    max_stretch: float = float("inf")
+    max_stretch: float | Array = float("inf")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", readonly(self.points))
