@@ -16,7 +16,7 @@ from technic.system.assemble import ElementFactory, Probe, System, assemble, ele
 from technic.system.inverse import SHIFT, shifted_inverse, single_thread
 from technic.tolerances import DRIVEN_MOTION, STATIC_RESIDUAL
 
-__all__ = ["Deflection", "Load", "deflect"]
+__all__ = ["Deflection", "Load", "deflect", "free_motions", "refuse_driven"]
 
 REFINEMENTS = 60
 """Steps of iterative refinement: each takes away a share of the shift's error."""
@@ -116,8 +116,8 @@ def deflect(
     if gravity is not None:
         falling = np.tile([*np.asarray(gravity, dtype=float), 0.0, 0.0, 0.0], len(assembly.parts))
         force = force + system.mass_matrix @ (system.R @ falling)
-    motions = _motions(system)
-    _refuse_driven(motions, force)
+    motions = free_motions(system)
+    refuse_driven(motions, force)
     x = _solve(system, motions, force)
     stretch = system.A @ x
     finite = np.where(system.elastic, system.rows.stiffness, 0.0) * stretch
@@ -137,7 +137,7 @@ def deflect(
     )
 
 
-def _motions(system: System) -> sparse.csc_array:
+def free_motions(system: System) -> sparse.csc_array:
     """Return every motion of the assembly over all unknowns."""
     assembly = system.assembly
     kin = kinematics(assembly)
@@ -152,7 +152,19 @@ def _motions(system: System) -> sparse.csc_array:
     )
 
 
-def _refuse_driven(motions: sparse.csc_array, force: Array) -> None:
+def refuse_driven(motions: sparse.csc_array, force: Array) -> None:
+    """Refuse a load that drives a motion which nothing resists.
+
+    Parameters
+    ----------
+    motions : (n, k) sparse
+        From `free_motions`.
+    force : (n,) ndarray
+
+    Raises
+    ------
+    UsageError
+    """
     if motions.shape[1] == 0:
         return
     furthest = np.asarray(abs(motions).max(axis=0).toarray()).ravel()

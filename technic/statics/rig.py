@@ -1,0 +1,172 @@
+"""A calibration rig: how far it gives way per newton, and how that depends on each joint stiffness.
+
+The rig is solved once, with the stiffnesses of a table. Other stiffnesses change few rows of the joint
+matrix, so their answer follows exactly from the motions in these rows (Woodbury's identity):
+
+    (K0 + A^T D A)^-1 = K0^-1 - K0^-1 A^T D (1 + V D)^-1 A K0^-1,    V = A K0^-1 A^T,  D = S - S0
+
+and the derivative of a displacement ``p^T x`` from ``dx/ds_r = -K^-1 A_r^T A_r x``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, sparse
+
+from technic.assembly.model import Assembly
+from technic.assembly.stiffness import SLOTS, StiffnessTable
+from technic.errors import UsageError
+from technic.geometry import Array
+from technic.statics.solve import free_motions, refuse_driven
+from technic.system.assemble import ElementFactory, Probe, System, assemble, element_of
+
+__all__ = ["Parameter", "RigModel", "parameter_rows", "rig_model"]
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Parameter:
+    """A stiffness that can be measured: the motion of a connection, e.g. shear of pin/pin_hole."""
+
+    connection: str
+    motion: str
+
+    def __str__(self) -> str:
+        return f"{self.motion} of {self.connection}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RigModel:
+    """A rig, ready to be asked for any stiffnesses.
+
+    Parameters
+    ----------
+    parameters : tuple of Parameter
+    start : (k,) ndarray
+        Stiffness of each in the table (N/m, N m/rad).
+    owner : (r,) ndarray of int
+        Parameter of each variable row.
+    factor : (r,) ndarray
+        Stiffness of the row per stiffness of its parameter (studs that act together).
+    base : (3, 6) ndarray
+        Displacement of the point along the axes under a unit force and under unit gravity along each,
+        with the table's stiffnesses (m/N, m per m/s2).
+    rows : (r, r) ndarray
+        ``V``.
+    loaded : (r, 6) ndarray
+        ``A x`` of the same six load cases.
+    """
+
+    parameters: tuple[Parameter, ...]
+    start: Array
+    owner: NDArray[np.int64]
+    factor: Array
+    base: Array
+    rows: Array
+    loaded: Array
+
+    def response(self, stiffness: Array) -> tuple[Array, Array]:
+        """Return the displacements, (3, 6), and their derivatives, (k, 3, 6), per log stiffness.
+
+        Parameters
+        ----------
+        stiffness : (k,) ndarray
+            One per parameter.
+        """
+        stiffness = np.asarray(stiffness, dtype=float)
+        own = self.factor * stiffness[self.owner]
+        change = own - self.factor * self.start[self.owner]
+        moved = linalg.solve(np.eye(len(own)) + self.rows * change, self.loaded)
+        # the point is loaded and measured in the same place: its probes are the first three cases
+        value = self.base - (self.loaded[:, :3] * change[:, None]).T @ moved
+        energy = np.einsum("ri,rj,r->rij", moved[:, :3], moved, own)
+        slope = np.zeros((len(self.parameters), 3, 6))
+        np.add.at(slope, self.owner, -energy)
+        return value, slope
+
+
+def parameter_rows(
+    system: System, parameters: Sequence[Parameter]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the rows of ``A`` that a parameter decides, and which one, each (r,)."""
+    index = {(p.connection, slot): k for k, p in enumerate(parameters) for slot in SLOTS[p.motion]}
+    joints = system.assembly.joints
+    found = [
+        (row, index[joints[link].connection, int(motion)])
+        for row, (link, motion) in enumerate(zip(system.rows.link, system.rows.motion, strict=True))
+        if link < len(joints) and (joints[link].connection, int(motion)) in index
+    ]
+    chosen = np.array(found, dtype=np.int64).reshape(-1, 2)
+    return chosen[:, 0], chosen[:, 1]
+
+
+def rig_model(
+    assembly: Assembly,
+    probe: Probe,
+    parameters: Sequence[Parameter],
+    table: StiffnessTable,
+    *,
+    element: ElementFactory = element_of,
+) -> RigModel:
+    """Return the model of a rig.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        With its clamps as supports and the stiffnesses of `table`.
+    probe : Probe
+        The point that is loaded and measured.
+    parameters : sequence of Parameter
+    table : StiffnessTable
+    element : callable
+        What parts are made of.
+
+    Raises
+    ------
+    UsageError
+        The rig has no joint of some parameter, or the load drives a motion that nothing resists.
+    """
+    system = assemble(assembly, element=element, probes=(probe,))
+    rows, owner = parameter_rows(system, parameters)
+    for k, parameter in enumerate(parameters):
+        if not np.any(owner == k):
+            raise UsageError(f"the rig {assembly.name!r} has no joint that holds {parameter}")
+    if not np.all(system.elastic[rows]):
+        raise UsageError(f"the rig {assembly.name!r} has joints that are held rigidly")
+    start = np.array([table.get(p.connection).values[p.motion].value for p in parameters])
+    point = system.probes[:3].toarray()
+    falling = np.tile(np.vstack([np.eye(3), np.zeros((3, 3))]), (len(assembly.parts), 1))
+    loads = np.column_stack([point.T, system.mass_matrix @ (system.R @ falling)])
+    motions = free_motions(system)
+    for load in loads.T:
+        refuse_driven(motions, load)
+    a = system.A[rows].toarray()
+    x = _solved(system, motions, np.column_stack([loads, a.T]))
+    return RigModel(
+        parameters=tuple(parameters),
+        start=start,
+        owner=owner,
+        factor=system.rows.stiffness[rows] / start[owner],
+        base=point @ x[:, :6],
+        rows=a @ x[:, 6:],
+        loaded=a @ x[:, :6],
+    )
+
+
+def _solved(system: System, motions: sparse.csc_array, loads: Array) -> Array:
+    """Return ``K^-1 loads`` on what obeys the supports, the free motions standing still."""
+    held = system.A[~system.elastic].toarray()
+    free = linalg.null_space(held) if len(held) else np.eye(system.size)
+    stiffness = free.T @ (system.K + system.J) @ free
+    idle = free.T @ motions.toarray()
+    if idle.shape[1]:
+        # what nothing resists and nothing drives may have any stiffness: it does not move
+        idle = linalg.orth(idle)
+        stiffness = stiffness + float(np.median(np.diag(stiffness))) * idle @ idle.T
+    scale = 1.0 / np.sqrt(np.diag(stiffness))
+    factor = linalg.cho_factor(scale[:, None] * stiffness * scale)
+    out = free @ (scale[:, None] * linalg.cho_solve(factor, scale[:, None] * (free.T @ loads)))
+    return np.asarray(out)
