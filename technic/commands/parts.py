@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from technic.commands.options import JsonOption
+from technic.commands.options import JsonOption, QuietOption
 
 __all__ = ["app"]
 
 app = typer.Typer(
-    help="List the known parts, or show one of them.", rich_markup_mode=None, no_args_is_help=True
+    help="List the known parts, show one of them, fetch the library of all.",
+    rich_markup_mode=None,
+    no_args_is_help=True,
 )
 
 
@@ -82,3 +86,79 @@ def show(
         finally:
             painter.close()
         typer.echo(f"picture: {picture}", err=True)
+
+
+@app.command("fetch")
+def fetch_library(
+    url: Annotated[
+        str | None,
+        typer.Option("--url", metavar="URL", help="Another place than ldraw.org."),
+    ] = None,
+    target: Annotated[
+        Path | None,
+        typer.Option(
+            "--to", metavar="ZIP", help="Another file than the one that is found by itself."
+        ),
+    ] = None,
+    quiet: QuietOption = False,
+) -> None:
+    """Download the LDraw parts library (complete.zip, about 130 MB) for parts outside the catalogue."""
+    from technic.ldraw.fetch import fetch, library_target, library_url
+    from technic.ldraw.library import Library
+
+    place = target or library_target()
+    with _bar(shown=not quiet and sys.stderr.isatty()) as progress:
+        done = fetch(url or library_url(), place, progress=progress)
+    if not quiet:
+        library = Library.open(done.path)
+        before = f" ({done.resumed / 2**20:.1f} MB were there)" if done.resumed else ""
+        typer.echo(
+            f"{done.path}: {done.size / 2**20:.1f} MB{before}, {len(library)} files", err=True
+        )
+        if target is not None:
+            typer.echo(f"Name it with --library {done.path} or in LDRAWDIR.", err=True)
+
+
+@contextmanager
+def _bar(*, shown: bool) -> Iterator[Callable[[int, int | None], None] | None]:
+    """Show a progress bar on the terminal; yields what it is told the progress with."""
+    if not shown:
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, DownloadColumn, Progress, TimeRemainingColumn
+
+    columns = (BarColumn(), DownloadColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("", total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+@app.command("cache")
+def show_cache(
+    json: JsonOption = None,
+    clear: Annotated[bool, typer.Option("--clear", help="Delete what is cached.")] = False,
+) -> None:
+    """Show what is kept in the cache folder, or clear it."""
+    from technic.errors import UsageError
+    from technic.ldraw import caches as kept
+    from technic.report.json import STDOUT, write_json
+
+    found = kept.caches()
+    if clear:
+        try:
+            count, size = kept.clear()
+        except OSError as error:
+            raise UsageError(f"{error.filename}: cannot be deleted ({error.strerror})") from None
+        typer.echo(f"deleted {count} files, {size / 1024:.0f} kB", err=True)
+        found = kept.caches()
+    if json is not None:
+        rows = [
+            {"name": c.name, "folder": str(c.folder), "files": len(c.files), "bytes": c.size}
+            for c in found
+        ]
+        write_json({"schema": "technic-cache/1", "caches": rows}, json)
+    if json != STDOUT:
+        for cache in found:
+            head = f"{cache.title}: {len(cache.files)} files, {cache.size / 1024:.0f} kB"
+            sys.stdout.write(f"{head} in {cache.folder}\n")
