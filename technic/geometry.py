@@ -19,6 +19,8 @@ __all__ = [
     "axes_from",
     "nearest_orthogonal",
     "readonly",
+    "rotation_matrix",
+    "rotation_vector",
     "shift_twist",
     "skew",
     "turn_twist",
@@ -122,6 +124,69 @@ def nearest_orthogonal(matrix: ArrayLike) -> Array:
     """Return the orthogonal matrix nearest to `matrix` (polar decomposition); reflections stay."""
     u, _, vt = np.linalg.svd(np.asarray(matrix, dtype=float))
     return np.asarray(u @ vt)
+
+
+def rotation_matrix(vector: ArrayLike) -> Array:
+    """Return the rotation by ``|v|`` radians about ``v`` (Rodrigues).
+
+    Parameters
+    ----------
+    vector : (..., 3) array_like
+
+    Returns
+    -------
+    (..., 3, 3) ndarray
+    """
+    v = np.asarray(vector, dtype=float)
+    angle = np.linalg.norm(v, axis=-1)[..., None, None]
+    k = skew(v)
+    half = np.sinc(angle / (2 * np.pi))  # sin(a/2) / (a/2), exact at zero
+    return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * k + half**2 / 2 * (k @ k))
+
+
+def rotation_vector(matrix: ArrayLike) -> Array:
+    """Return axis times angle of rotations; the inverse of `rotation_matrix` below a half turn.
+
+    Parameters
+    ----------
+    matrix : (..., 3, 3) array_like
+
+    Returns
+    -------
+    (..., 3) ndarray
+        Through the quaternion (S. W. Shepperd, J. Guidance and Control 1, 1978), which keeps all
+        digits at small angles and near a half turn.
+    """
+    q = np.asarray(matrix, dtype=float)
+    trace = np.trace(q, axis1=-2, axis2=-1)
+    diagonal = np.einsum("...ii->...i", q)
+    square = np.concatenate([trace[..., None], diagonal], axis=-1)
+    pick = np.argmax(square, axis=-1)
+    anti = np.stack(
+        [
+            q[..., 2, 1] - q[..., 1, 2],
+            q[..., 0, 2] - q[..., 2, 0],
+            q[..., 1, 0] - q[..., 0, 1],
+        ],
+        axis=-1,
+    )
+    both = q + np.swapaxes(q, -1, -2)
+    # four equal quaternions, each exact where its own first entry is the largest
+    first = np.concatenate([(1.0 + trace)[..., None], anti], axis=-1)
+    options = [first]
+    for i in range(3):
+        row = both[..., i, :].copy()
+        row[..., i] = 1.0 + 2.0 * diagonal[..., i] - trace
+        options.append(np.concatenate([anti[..., i : i + 1], row], axis=-1))
+    chosen = np.take_along_axis(np.stack(options, axis=-2), pick[..., None, None], axis=-2).squeeze(
+        -2
+    )
+    chosen = chosen / np.linalg.norm(chosen, axis=-1, keepdims=True)
+    chosen = np.where(chosen[..., :1] < 0.0, -chosen, chosen)
+    size = np.linalg.norm(chosen[..., 1:], axis=-1)
+    angle = 2.0 * np.arctan2(size, chosen[..., 0])
+    scale = np.where(size > 1e-12, angle / np.maximum(size, 1e-300), 2.0)
+    return np.asarray(chosen[..., 1:] * scale[..., None])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
-from scipy.spatial.transform import Rotation
 
 from technic.assembly.joint_types import JointType
 from technic.assembly.model import Assembly
-from technic.geometry import Array, Pose
+from technic.geometry import Array, Pose, rotation_matrix, rotation_vector, skew
 from technic.rigidity.kinematics import Kinematics
 
 __all__ = ["Placement", "close_joints", "placed_assembly", "step"]
@@ -69,7 +68,7 @@ def step(placement: Placement, twists: Array) -> Placement:
     """Return the placement after every part moved by a finite twist about its centroid (m, rad)."""
     return Placement(
         placement.origins + twists[:, :3],
-        Rotation.from_rotvec(twists[:, 3:]).as_matrix() @ placement.turns,
+        rotation_matrix(twists[:, 3:]) @ placement.turns,
     )
 
 
@@ -111,7 +110,7 @@ def _gaps(links: _Links, placement: Placement, length: float) -> Array:
     # axes of side 1, because that is the ground for supports
     out[:, :3] = np.einsum("kac,kc->ka", axes[:, 1], points[:, 0] - points[:, 1]) / length
     relative = axes[:, 1] @ np.swapaxes(axes[:, 0], 1, 2)
-    out[:, 3:] = Rotation.from_matrix(relative).as_rotvec()
+    out[:, 3:] = rotation_vector(relative)
     # a universal joint keeps its two axes at the angle they had, whatever it turns about them
     cross = np.einsum("kc,kc->k", axes[:, 0, 1], axes[:, 1, 2])
     out[links.universal, 3] = -cross[links.universal]
@@ -122,28 +121,22 @@ def _jacobian(
     links: _Links, placement: Placement, length: float, dofs: NDArray[np.int64]
 ) -> sparse.csr_array:
     points, axes = _sides(links, placement)
-    n = len(placement.origins)
     width = len(dofs)
-    data, rows, columns = [], [], []
     index = np.cumsum(links.held.ravel()).reshape(links.held.shape) - 1
+    e = axes[:, 1]
+    data, rows, columns = [], [], []
     for side in (0, 1):
-        for k, part in enumerate(links.parts[:, side]):
-            if part < 0:
-                continue
-            arm = (points[k, 0] - placement.origins[part]) / length
-            e = axes[k, 1]
-            block = np.zeros((6, 6))
-            block[:3, :3] = block[3:, 3:] = e
-            # e (theta x arm) = (arm x e) theta, row by row
-            block[:3, 3:] = np.cross(arm, e)
-            held = links.held[k]
-            block = (1.0 - 2.0 * side) * block[held][:, dofs]
-            data.append(block.ravel())
-            rows.append(np.repeat(index[k][held], width))
-            columns.append(np.tile(np.arange(width * part, width * part + width), held.sum()))
-    shape = (int(links.held.sum()), width * n)
-    if not data:
-        return sparse.csr_array(shape)
+        there = np.flatnonzero(links.parts[:, side] >= 0)
+        part = links.parts[there, side]
+        arm = (points[there, 0] - placement.origins[part]) / length
+        block = np.zeros((len(there), 6, 6))
+        block[:, :3, :3] = block[:, 3:, 3:] = e[there]
+        block[:, :3, 3:] = -e[there] @ skew(arm)
+        k, motion = np.nonzero(links.held[there])
+        data.append((1.0 - 2.0 * side) * block[k, motion][:, dofs].ravel())
+        rows.append(np.repeat(index[there[k], motion], width))
+        columns.append((width * part[k][:, None] + np.arange(width)).ravel())
+    shape = (int(links.held.sum()), width * len(placement.origins))
     return sparse.csr_array(
         (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns))), shape=shape
     )

@@ -68,6 +68,15 @@ class Kinematics:
             out[list(parts)] = c
         return out
 
+    @cached_property
+    def touching(self) -> tuple[tuple[int, ...], ...]:
+        """Joints and supports of every part."""
+        out: list[list[int]] = [[] for _ in self.assembly.parts]
+        for k, owner in enumerate(self.owners):
+            for p in owner:
+                out[p].append(k)
+        return tuple(tuple(links) for links in out)
+
     def links_of(self, component: int) -> list[int]:
         """Return the joints and supports of a component."""
         own = self.component_of

@@ -58,6 +58,7 @@ def sort_motions(kin: Kinematics, motions: ComponentMotions, component: int) -> 
         return SortedMotions(0, 0, 0, 0, (), tuple(clusters))
     grounded = motions.rigid == 0
     local: list[tuple[MotionKind, Cluster, LocalMotion]] = []
+    levers: list[tuple[Cluster, LocalMotion]] = []
     for n, cluster in enumerate(clusters):
         for motion in cluster.local:
             kind = _local_kind(kin, cluster, motion)
@@ -65,11 +66,14 @@ def sort_motions(kin: Kinematics, motions: ComponentMotions, component: int) -> 
                 continue  # the main body stands still, unless it is a rod that turns about itself
             if kind is not MotionKind.STRUCTURAL:
                 local.append((kind, cluster, motion))
+            elif not cluster.fasteners_only:
+                levers.append((cluster, motion))
     space = structural_space(
         kin,
         motions,
         clusters,
         [(c, m) for _, c, m in local],
+        levers,
         grounded=grounded,
     )
     structural = split_by_order(kin, motions, component, space)
@@ -146,11 +150,10 @@ def _motion(
     for cluster, twist in zip(clusters, twists, strict=True):
         if np.abs(twist).max() < MOTION_KIND_CUT * np.abs(twists).max():
             continue
-        for p in cluster.parts:
-            arm = (kin.origins[p] - cluster.reference) / kin.length
-            parts.append(p)
-            part_twists.append((shift_twist(arm) @ twist) * kin.units)
-    moved = np.array(part_twists)
+        arms = (kin.origins[list(cluster.parts)] - cluster.reference) / kin.length
+        parts += cluster.parts
+        part_twists.append((shift_twist(arms) @ twist) * kin.units)
+    moved = np.concatenate(part_twists)
     moved /= max(
         float(np.linalg.norm(moved[:, :3], axis=1).max()),
         kin.length * float(np.linalg.norm(moved[:, 3:], axis=1).max()),
@@ -160,7 +163,7 @@ def _motion(
         kind=kind,
         type=shape.type,
         parts=tuple(parts),
-        freed_by=_freed_by(kin, component, parts, moved),
+        freed_by=_freed_by(kin, parts, moved),
         twists=moved,
         axis_point=shape.point,
         axis_direction=shape.direction,
@@ -170,7 +173,7 @@ def _motion(
     )
 
 
-def _freed_by(kin: Kinematics, component: int, parts: list[int], twists: Array) -> tuple[int, ...]:
+def _freed_by(kin: Kinematics, parts: list[int], twists: Array) -> tuple[int, ...]:
     """Return the joints in which the motion takes place.
 
     A joint to a fastener that is not itself listed counts when the listed part moves there.
@@ -178,9 +181,9 @@ def _freed_by(kin: Kinematics, component: int, parts: list[int], twists: Array) 
     scaled = {p: t / kin.units for p, t in zip(parts, twists, strict=True)}
     size = max(float(np.abs(t).max()) for t in scaled.values())
     out = []
-    for k in kin.links_of(component):
+    for k in sorted({k for p in parts for k in kin.touching[p]}):
         owner = kin.owners[k]
-        if len(owner) != 2 or not any(p in scaled for p in owner):
+        if len(owner) != 2:
             continue
         slip = sum(
             (kin.sides[k, s] @ scaled[p] for s, p in enumerate(owner) if p in scaled), np.zeros(6)

@@ -50,15 +50,17 @@ def split_by_order(
     bodies = len(space.bodies)
     if space.size == 0:
         return []
-    readable = sparse_basis(space.basis, bodies)
+    readable = sparse_basis(space.basis, bodies, space.simple)
     finite = _finite_directions(kin, motions, component, space)
     count = finite.shape[1]
     if count == space.size:
         return [(v, FINITE) for v in readable]
     if count == 0:
         return [(v, FIRST_ORDER) for v in readable]
-    out = [(v, FINITE) for v in sparse_basis(finite, bodies)]
     taken, _ = np.linalg.qr(finite)
+    outside = space.simple - taken @ (taken.T @ space.simple)
+    simple = space.simple[:, np.linalg.norm(outside, axis=0) < MOTION_KIND_CUT]
+    out = [(v, FINITE) for v in sparse_basis(taken, bodies, simple)]
     for vector in readable:
         flat = vector.ravel() / np.linalg.norm(vector)
         for _ in range(2):

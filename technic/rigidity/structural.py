@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from technic.geometry import Array, shift_twist
+from technic.groups import connected_groups
 from technic.rigidity.clusters import Cluster, LocalMotion
 from technic.rigidity.kinematics import ComponentMotions, Kinematics
 from technic.tolerances import MOTION_KIND_CUT
@@ -32,6 +33,8 @@ class StructuralSpace:
         Orthonormal.
     removed : (6 * len(bodies), r) ndarray
         Spinning, sliding and idling of single clusters, orthonormal, taken out of `basis`.
+    simple : (6 * len(bodies), q) ndarray
+        Orthonormal motions in `basis` that move one cluster only.
     field : (6 * len(bodies), k) ndarray
         The same clusters in every motion of the component, the main body standing still (unless the
         component is grounded).
@@ -41,6 +44,7 @@ class StructuralSpace:
     bodies: tuple[int, ...]
     basis: Array
     removed: Array
+    simple: Array
     field: Array
 
     @property
@@ -73,6 +77,7 @@ def structural_space(
     motions: ComponentMotions,
     clusters: list[Cluster],
     local: list[tuple[Cluster, LocalMotion]],
+    levers: list[tuple[Cluster, LocalMotion]],
     *,
     grounded: bool,
 ) -> StructuralSpace:
@@ -86,6 +91,8 @@ def structural_space(
         Main body first.
     local : list of (Cluster, LocalMotion)
         Spinning, sliding and idle motions, which are not structural.
+    levers : list of (Cluster, LocalMotion)
+        Structural motions of single clusters other than the main body.
     grounded : bool
         The component has a support; then the main body may move too.
     """
@@ -110,7 +117,13 @@ def structural_space(
     rest = flat - removed @ (removed.T @ flat)
     u, values, _ = np.linalg.svd(rest, full_matrices=False)
     kept = values > MOTION_KIND_CUT * max(1.0, float(values.max(initial=0.0)))
-    return StructuralSpace(tuple(clusters), tuple(bodies), u[:, kept], removed, flat)
+    basis = u[:, kept]
+    simple = np.zeros((len(basis), len(levers)))
+    for k, (cluster, motion) in enumerate(levers):
+        place = 6 * own[id(cluster)]
+        simple[place : place + 6, k] = motion.twist
+    inside = np.linalg.norm(simple - basis @ (basis.T @ simple), axis=0) < MOTION_KIND_CUT
+    return StructuralSpace(tuple(clusters), tuple(bodies), basis, removed, simple[:, inside], flat)
 
 
 def cluster_field(
@@ -134,13 +147,43 @@ def cluster_field(
     return out
 
 
-def sparse_basis(space: Array, bodies: int) -> list[Array]:
-    """Return a basis whose vectors move as few bodies as a greedy search finds.
+def sparse_basis(space: Array, bodies: int, simple: Array | None = None) -> list[Array]:
+    """Return a basis whose vectors move as few bodies as a greedy search finds, each (bodies, 6).
 
-    For each body in turn, the largest last, other bodies are held still one after another as long as
+    Motions of one body (`simple`, orthonormal, in the space) come first; the search covers what is
+    left. For each body in turn, the largest last, other bodies are held still one after another as long as
     some motion of this body is left; the shortest independent results are kept.
     """
+    if simple is not None and simple.shape[1]:
+        first = [v.reshape(bodies, 6) / np.abs(v).max() for v in simple.T]
+        rest = space - simple @ (simple.T @ space)
+        u, values, _ = np.linalg.svd(rest, full_matrices=False)
+        return first + sparse_basis(u[:, values > MOTION_KIND_CUT], bodies)
+    out: list[Array] = []
+    for group in _independent(space, bodies):
+        rows = (6 * np.array(group)[:, None] + np.arange(6)).ravel()
+        u, values, _ = np.linalg.svd(space[rows], full_matrices=False)
+        for vector in _search(u[:, values > 0.5], len(group)):
+            whole = np.zeros((bodies, 6))
+            whole[list(group)] = vector
+            out.append(whole)
+    return out
+
+
+def _independent(space: Array, bodies: int) -> list[tuple[int, ...]]:
+    """Return groups of bodies such that the space is the direct sum of its parts on the groups."""
+    projector = space @ space.T
+    ties = np.abs(projector).reshape(bodies, 6, bodies, 6).max(axis=(1, 3)) > MOTION_KIND_CUT**2
+    moving = np.flatnonzero(np.diagonal(ties))
+    pairs = ((int(a), int(b)) for a, b in np.argwhere(ties) if a < b and ties[a, a] and ties[b, b])
+    return connected_groups([int(b) for b in moving], pairs)
+
+
+def _search(space: Array, bodies: int) -> list[Array]:
+    """Return a basis of a space that does not fall apart; see `sparse_basis`."""
     count = space.shape[1]
+    if count == 0:
+        return []
     blocks = space.reshape(bodies, 6, count)
     size = np.linalg.norm(blocks, axis=(1, 2))
     moving = [b for b in range(bodies) if size[b] > MOTION_KIND_CUT]
@@ -155,7 +198,7 @@ def sparse_basis(space: Array, bodies: int) -> list[Array]:
                 : still.shape[1]
             ]
             trial = still @ vt[values < MOTION_KIND_CUT].T
-            if trial.shape[1] and np.linalg.norm(blocks[body] @ trial, 2) > MOTION_KIND_CUT:
+            if trial.shape[1] and np.abs(blocks[body] @ trial).max() > MOTION_KIND_CUT:
                 still = trial
         _, _, vt = np.linalg.svd(blocks[body] @ still)
         vector = (space @ (still @ vt[0])).reshape(bodies, 6)

@@ -14,8 +14,9 @@ __all__ = ["is_rotor"]
 def is_rotor(parts: list[Part], point: Array, direction: Array) -> bool:
     """Tell whether a body that turns about a line is a wheel, gear or rotor rather than a lever.
 
-    It is when one of its parts that are not fasteners, or all of them together, is balanced about the
-    line and has the same moment of inertia about every axis across it.
+    It is when it is balanced about the line and one of its parts that are not fasteners, or all of them
+    together, is round: has the same moment of inertia about every axis across the line. A boom or a
+    crank fixed to a gear is not balanced, and stays a lever.
 
     Parameters
     ----------
@@ -24,25 +25,40 @@ def is_rotor(parts: list[Part], point: Array, direction: Array) -> bool:
         The line, world coordinates (m).
     """
     solid = [p for p in parts if not p.fastener]
-    return any(_round([p], point, direction) for p in solid) or _round(solid, point, direction)
+    if not _balanced(solid, point, direction):
+        return False
+    return _round(solid, direction) or any(
+        _balanced([p], point, direction) and _round([p], direction) for p in solid
+    )
 
 
-def _round(parts: list[Part], point: Array, direction: Array) -> bool:
-    mass = sum(p.mass_properties.mass for p in parts)
+def _balanced(parts: list[Part], point: Array, direction: Array) -> bool:
+    mass, centroid, _ = _together(parts)
     if mass <= 0.0:
         return False
-    centroid = sum((p.mass_properties.mass * p.centroid for p in parts), np.zeros(3)) / mass
     arm = centroid - point
-    if np.linalg.norm(arm - (arm @ direction) * direction) > WHEEL_BALANCE:
-        return False
+    return bool(np.linalg.norm(arm - (arm @ direction) * direction) <= WHEEL_BALANCE)
+
+
+def _round(parts: list[Part], direction: Array) -> bool:
+    _, _, inertia = _together(parts)
+    # second moments of mass across the line: a round body has equal ones and no product
+    across = np.linalg.svd(direction[None])[2][1:]
+    second = across @ (np.trace(inertia) / 2 * np.eye(3) - inertia) @ across.T
+    half, spread = np.trace(second) / 2, np.linalg.norm(second - np.trace(second) / 2 * np.eye(2))
+    return bool(spread <= WHEEL_ROUNDNESS * half)
+
+
+def _together(parts: list[Part]) -> tuple[float, Array, Array]:
+    """Return mass, centroid and inertia about it of several parts, world axes."""
+    mass = sum(p.mass_properties.mass for p in parts)
+    centroid = sum((p.mass_properties.mass * p.centroid for p in parts), np.zeros(3)) / (
+        mass or 1.0
+    )
     inertia = np.zeros((3, 3))
     for p in parts:
         q = p.pose.rotation
         d = p.centroid - centroid
         inertia += q @ p.mass_properties.inertia @ q.T
         inertia += p.mass_properties.mass * ((d @ d) * np.eye(3) - np.outer(d, d))
-    # second moments of mass across the line: a round body has equal ones and no product
-    across = np.linalg.svd(direction[None])[2][1:]
-    second = across @ (np.trace(inertia) / 2 * np.eye(3) - inertia) @ across.T
-    half, spread = np.trace(second) / 2, np.linalg.norm(second - np.trace(second) / 2 * np.eye(2))
-    return bool(spread <= WHEEL_ROUNDNESS * half)
+    return mass, centroid, inertia
