@@ -1,0 +1,1 @@
+"""The page: one self-contained HTML file with a model that turns, bends and plays its motions."""

@@ -1,0 +1,237 @@
+"""The model as one block of bytes for the page's viewer, and the table that says what lies where.
+
+The block is compressed (gzip) and written once in base64. All arrays are little-endian; lengths are in
+millimetres from the middle of the model, in the axes of the model file. Nothing is stored per part that
+belongs to its type.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from technic.geometry import Array
+from technic.report.camera import view_direction
+from technic.report.drawing import Drawing
+from technic.report.html.energy import energy_shares
+from technic.report.html.fields import Field, mode_fields, motion_fields
+from technic.report.html.shapes import Shapes, shapes_of
+from technic.report.load_arrows import ARROW_RADIUS, ARROW_SHARE, load_samples
+from technic.report.motion_picture import motion_glyphs
+from technic.report.palette import color_name, color_rgb
+from technic.report.phrases import motion_words
+from technic.report.scene import merge
+from technic.report.wording import number
+from technic.report.worst_field import worst_field
+from technic.rigidity.result import MotionKind, RigidityReport
+from technic.rigidity.serialize import spot_place
+from technic.units import MM
+
+__all__ = ["Block", "pack"]
+
+_GLYPHS_ABOVE = 12
+"""Motions after these many have no arrows of their own: they are played."""
+
+
+@dataclass(slots=True)
+class Block:
+    """Arrays behind one another, each on a multiple of 4 bytes."""
+
+    data: bytearray = field(default_factory=bytearray)
+
+    def add(self, values: Any, dtype: str) -> dict[str, Any]:
+        """Append an array ("float32", "uint32", "uint16" or "uint8"); return where it lies."""
+        array: NDArray[Any] = np.ascontiguousarray(values, dtype=np.dtype(dtype).newbyteorder("<"))
+        self.data.extend(b"\0" * (-len(self.data) % 4))
+        place = {"type": dtype, "at": len(self.data), "length": int(array.size)}
+        self.data.extend(array.tobytes())
+        return place
+
+    def text(self) -> str:
+        """Return the block compressed, in base64; the same bytes for the same content."""
+        return base64.b64encode(gzip.compress(bytes(self.data), 9, mtime=0)).decode("ascii")
+
+
+class _Words:
+    """Each text once; others refer to it by number."""
+
+    def __init__(self) -> None:
+        self.texts: dict[str, int] = {}
+
+    def number(self, text: str) -> int:
+        return self.texts.setdefault(text, len(self.texts))
+
+
+def _parts(report: RigidityReport, drawing: Drawing, energy: Array, words: _Words) -> list[Any]:
+    rows = []
+    for k, part in enumerate(report.assembly.parts):
+        source = part.source
+        rows.append(
+            [
+                words.number(part.number),
+                words.number(part.name or part.number or part.id),
+                words.number(color_name(part.color)),
+                words.number(source.submodel if source is not None else part.id),
+                source.step if source is not None else 0,
+                source.line if source is not None else 0,
+                int(part.fastener),
+                int(drawing.solids[k].stand_in),
+                float(f"{energy[k]:.5g}"),
+            ]
+        )
+    return rows
+
+
+def _shapes(block: Block, shapes: Shapes) -> list[dict[str, Any]]:
+    members: list[list[int]] = [[] for _ in shapes.solids]
+    for k, t in enumerate(shapes.of_part):
+        members[t].append(k)
+    return [
+        {
+            "points": block.add(solid.points / MM, "float32"),
+            "faces": block.add(solid.faces, "uint16"),
+            "edges": block.add(solid.edges, "uint16"),
+            "parts": block.add(mine, "uint32"),
+        }
+        for solid, mine in zip(shapes.solids, members, strict=True)
+    ]
+
+
+def _field(block: Block, movement: Field) -> dict[str, Any]:
+    twists = movement.twists.copy()
+    twists[:, :3] /= MM
+    found: dict[str, Any] = {
+        "twists": block.add(twists, "float32"),
+        "scale": movement.scale,
+        "turns": movement.turns,
+    }
+    if movement.bending is not None:
+        found["bending"] = block.add(movement.bending / MM, "float32")
+        found["sizes"] = block.add(movement.sizes / MM, "float32")
+    return found
+
+
+def _load(block: Block, report: RigidityReport, diagonal: float, scale: float, middle: Array) -> Any:
+    sampled = worst_field(report)
+    if sampled is None:
+        return None
+    samples = load_samples(report, diagonal, sampled, scale)
+    if not samples:
+        return None
+    ways = sampled.displacements[samples]
+    largest = float(np.linalg.norm(ways, axis=1).max())
+    return {
+        "points": block.add((sampled.points[samples] - middle) / MM, "float32"),
+        "ways": block.add(ways / MM, "float32"),
+        "parts": block.add(sampled.parts[samples], "uint32"),
+        "vectors": block.add(ways / largest * ARROW_SHARE * diagonal / MM, "float32"),
+        "radius": ARROW_RADIUS * diagonal / MM,
+    }
+
+
+def _motions(
+    block: Block, report: RigidityReport, drawing: Drawing, shapes: Shapes, middle: Array
+) -> list[dict[str, Any]]:
+    found = []
+    for n, (motion, movement) in enumerate(motion_fields(report, drawing, shapes)):
+        entry = _field(block, movement)
+        entry["parts"] = block.add(list(motion.parts), "uint32")
+        entry["kind"] = motion.kind.value
+        entry["number"] = report.motions.index(motion)
+        entry["words"] = motion_words(report, motion)
+        if n < _GLYPHS_ABOVE and motion.kind is MotionKind.STRUCTURAL:
+            glyphs = motion_glyphs(motion, report, drawing.points, drawing.diagonal)
+            if glyphs:
+                surface = merge(glyphs)
+                entry["arrows"] = {
+                    "points": block.add((surface.points - middle) / MM, "float32"),
+                    "faces": block.add(surface.faces, "uint16"),
+                }
+        found.append(entry)
+    return found
+
+
+def _spots(report: RigidityReport, limit: int) -> list[dict[str, Any]]:
+    found = []
+    for spot in report.weak_spots[:limit]:
+        place = spot_place(report.assembly, spot)
+        point = report.assembly.joints[spot.index].point if spot.kind == "joint" else None
+        found.append(
+            {
+                "rank": spot.rank,
+                "part": next(k for k in spot.parts if report.assembly.parts[k] is place),
+                "parts": list(spot.parts),
+                "point": None if point is None else [float(v) for v in point],
+            }
+        )
+    return found
+
+
+def pack(report: RigidityReport, drawing: Drawing, spots: int) -> tuple[dict[str, Any], str]:
+    """Return the table of contents, ready for JSON, and the block in base64.
+
+    Parameters
+    ----------
+    report : RigidityReport
+    drawing : Drawing
+    spots : int
+        How many weak spots have a row to fly from.
+    """
+    parts = report.assembly.parts
+    block = Block()
+    shapes = shapes_of(parts, drawing.solids)
+    everything = np.concatenate(drawing.points)
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    middle = 0.5 * (low + high)
+    energy = energy_shares(report)
+    words = _Words()
+    modes = mode_fields(report, drawing, shapes)
+    field = worst_field(report)
+    toward = view_direction(everything, None if field is None else field.displacements)
+    rotations = np.array([part.pose.rotation for part in parts])
+    translations = np.array([part.pose.translation for part in parts])
+    centroids = np.array([part.centroid for part in parts])
+    inner = np.array([part.mass_properties.centroid for part in parts])
+    rows = _parts(report, drawing, energy, words)
+    contents: dict[str, Any] = {
+        "name": report.assembly.name,
+        "count": len(parts),
+        "half": [float(v) for v in 0.5 * (high - low) / MM],
+        "light": shapes.light,
+        "toward": [float(v) for v in toward],
+        "rotations": block.add(rotations, "float32"),
+        "translations": block.add((translations - middle) / MM, "float32"),
+        "centroids": block.add((centroids - middle) / MM, "float32"),
+        "inner": block.add(inner / MM, "float32"),
+        "colors": block.add(
+            np.round(255 * np.array([color_rgb(part.color) for part in parts])), "uint8"
+        ),
+        "energy": block.add(energy, "float32"),
+        "shapes": _shapes(block, shapes),
+        "modes": [
+            {
+                **_field(block, movement),
+                "label": f"{number(mode.value)} N/m",
+                "bends": movement.bending is not None,
+            }
+            for mode, movement in zip(
+                [m for m in report.modes if m.value > 0.0], modes, strict=False
+            )
+        ],
+        "load": _load(block, report, drawing.diagonal, modes[0].scale, middle) if modes else None,
+        "motions": _motions(block, report, drawing, shapes, middle),
+    }
+    spot_rows = _spots(report, spots)
+    for row in spot_rows:
+        if row["point"] is not None:
+            row["point"] = [float(v) for v in (np.array(row["point"]) - middle) / MM]
+    contents["spots"] = spot_rows
+    told = json.dumps({"words": list(words.texts), "rows": rows}, ensure_ascii=False)
+    contents["parts"] = block.add(np.frombuffer(told.encode("utf-8"), dtype=np.uint8), "uint8")
+    return contents, block.text()

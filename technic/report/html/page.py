@@ -1,0 +1,217 @@
+"""Put the page together: words, tables, the model, the viewer, and a policy that lets nothing else in."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import io
+import json
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from technic.report.drawing import Drawing, drawing_of
+from technic.report.files import write_atomic
+from technic.report.html.pack import pack
+from technic.report.html.tables import (
+    SPOT_ROWS,
+    finding_groups,
+    motion_rows,
+    spot_rows,
+    stiffness_rows,
+    unknown_rows,
+)
+from technic.report.pattern import describe_field
+from technic.report.wording import count, number
+from technic.report.worst_field import worst_field
+from technic.rigidity.result import RigidityReport, Verdict
+from technic.rigidity.serialize import size_mm
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+__all__ = ["page", "write_page"]
+
+_PICTURE_WIDTH = 1280
+
+_TONES = {
+    Verdict.RIGID: "good",
+    Verdict.FLEXIBLE: "bad",
+    Verdict.DISCONNECTED: "bad",
+    Verdict.UNDETERMINED: "warn",
+}
+
+
+def _asset(name: str) -> str:
+    return files("technic.report.html").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+@cache
+def _template() -> Template:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    # Names in model files are anybody's: everything is escaped unless the template says otherwise.
+    environment = Environment(
+        loader=PackageLoader("technic.report.html"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("page.html.j2")
+
+
+def _hash(text: str) -> str:
+    """Return the source expression of the policy that admits exactly this text."""
+    digest = hashlib.sha256(text.encode("utf-8")).digest()
+    return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
+
+
+def _json(content: Any) -> str:
+    """Return JSON that may stand inside a script element: no letter that could end it."""
+    text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _embedded(picture: bytes) -> str:
+    """Return a PNG as a smaller picture in a data address."""
+    from PIL import Image
+
+    image = Image.open(io.BytesIO(picture)).convert("RGB")
+    if image.width > _PICTURE_WIDTH:
+        height = round(image.height * _PICTURE_WIDTH / image.width)
+        image = image.resize((_PICTURE_WIDTH, height), Image.Resampling.LANCZOS)
+    stream = io.BytesIO()
+    image.save(stream, format="WEBP", quality=82, method=4)
+    return "data:image/webp;base64," + base64.b64encode(stream.getvalue()).decode("ascii")
+
+
+def _facts(report: RigidityReport) -> list[tuple[str, str, str]]:
+    """Return the numbers at the top: name, value, remark."""
+    facts: list[tuple[str, str, str]] = []
+    rigidity = report.rigidity
+    if rigidity is not None:
+        sure = (
+            "how sure: not known, the joints are not calibrated"
+            if rigidity.interval_95 is None
+            else "95 % interval: {} to {} N/m".format(*(number(v) for v in rigidity.interval_95))
+        )
+        facts.append(("Rigidity, worst case", f"{number(rigidity.value)} N/m", sure))
+        if rigidity.measure == "mean_square":
+            facts.append(
+                (
+                    "Softest way to push it",
+                    f"{number(rigidity.compliance_mm_per_n)} mm",
+                    "for 1 N (root mean square over the material)",
+                )
+            )
+        if rigidity.frequency_hz is not None:
+            facts.append(
+                ("Lowest natural frequency", f"{number(rigidity.frequency_hz)} Hz", "of its own")
+            )
+    mobility = report.mobility
+    said = [f"{mobility.spinning} spin", f"{mobility.sliding} slide", f"{mobility.idle} idle"]
+    qualifier = f"{report.qualifier} " if report.qualifier else ""
+    facts.append(("Motions", f"{qualifier}{mobility.structural}", "and " + ", ".join(said)))
+    size = " × ".join(number(value) for value in size_mm(report.assembly))
+    parts = count(len(report.assembly.parts), "part")
+    facts.append(("Model", parts, f"{size} mm, {number(report.mass * 1e3)} g"))
+    return facts
+
+
+def _softest(report: RigidityReport) -> str:
+    field = worst_field(report)
+    if field is None:
+        return ""
+    phrase = describe_field(field.points, field.displacements, field.weights)
+    return f"Under its worst load {phrase}." if phrase else ""
+
+
+def page(
+    report: RigidityReport, *, picture: bytes | None = None, drawing: Drawing | None = None
+) -> str:
+    """Return the whole page.
+
+    Parameters
+    ----------
+    report : RigidityReport
+    picture : bytes, optional
+        PNG of `technic.report.picture.report_scene`; without it the page prints the viewer's view.
+    drawing : Drawing, optional
+        Of the report's assembly, when it is there already.
+
+    Returns
+    -------
+    str
+        HTML that asks for nothing from outside.
+    """
+    import technic
+
+    contents: dict[str, Any] | None = None
+    block = ""
+    if report.assembly.parts:
+        drawing = drawing_of(report.assembly) if drawing is None else drawing
+        contents, block = pack(report, drawing, SPOT_ROWS)
+    motions = [] if contents is None else contents["motions"]
+    played = {entry["number"]: n for n, entry in enumerate(motions)}
+    style, script = _asset("page.css"), _asset("viewer.js")
+    scripts = _hash(script) if contents is not None else "'none'"
+    policy = (
+        f"default-src 'none'; script-src {scripts}; style-src {_hash(style)}; img-src data:; "
+        "base-uri 'none'; form-action 'none'"
+    )
+    return _template().render(
+        policy=policy,
+        style=style,
+        script=script,
+        licence=_asset("LICENSE.three.txt"),
+        version=technic.__version__,
+        name=report.assembly.name,
+        tone=_TONES[report.verdict],
+        verdict=report.verdict.value,
+        reason=report.reason,
+        facts=_facts(report),
+        softest=_softest(report),
+        moves=report.mobility.total > report.mobility.idle,
+        picture=None if picture is None else _embedded(picture),
+        contents=contents,
+        contents_json=None if contents is None else _json(contents),
+        block=block,
+        spots=spot_rows(report),
+        spot_count=len(report.weak_spots),
+        motions=motion_rows(report, played),
+        motion_count=len(report.motions) - sum(m.kind == "idle" for m in report.motions),
+        idle=report.mobility.idle,
+        unknown=unknown_rows(report),
+        findings=finding_groups(report),
+        stiffness=stiffness_rows(report),
+        not_modelled=report.not_modelled,
+        rigidity=report.rigidity,
+        mobility=report.mobility,
+        source=report.assembly.source,
+        joints=len(report.assembly.joints),
+        unknowns=report.unknowns,
+    )
+
+
+def write_page(
+    report: RigidityReport,
+    path: Path,
+    *,
+    picture: bytes | None = None,
+    drawing: Drawing | None = None,
+) -> None:
+    """Write `page` into a file.
+
+    Raises
+    ------
+    UsageError
+        When the file cannot be written.
+    """
+    text = page(report, picture=picture, drawing=drawing)
+    write_atomic(path, lambda temporary: _write(temporary, text))
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")

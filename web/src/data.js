@@ -1,0 +1,34 @@
+// Reads what the page brings along: a table of contents (JSON) and one compressed block of arrays.
+
+const KINDS = {
+  float32: Float32Array,
+  uint32: Uint32Array,
+  uint16: Uint16Array,
+  uint8: Uint8Array,
+};
+
+/** Unpack the block and return the contents with a function that finds an array in it. */
+export async function readModel() {
+  const contents = JSON.parse(document.getElementById("contents").textContent);
+  const text = document.getElementById("block").textContent.trim();
+  const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const buffer = await new Response(stream).arrayBuffer();
+  const array = (place) => new KINDS[place.type](buffer, place.at, place.length);
+  const told = JSON.parse(new TextDecoder().decode(array(contents.parts)));
+  const parts = told.rows.map(
+    ([number, name, color, submodel, step, line, fastener, standIn, energy], index) => ({
+      index,
+      number: told.words[number],
+      name: told.words[name],
+      color: told.words[color],
+      submodel: told.words[submodel],
+      step,
+      line,
+      fastener: fastener === 1,
+      standIn: standIn === 1,
+      energy,
+    }),
+  );
+  return { contents, array, parts };
+}
