@@ -23,9 +23,12 @@ from technic.commands.options import (
     PartModelOption,
     PictureOption,
     QuietOption,
+    ReportOption,
     RequireRigidOption,
     ShadowOption,
+    ViewOption,
 )
+from technic.commands.outputs import Outputs
 from technic.commands.reading import LibraryOptions, reading
 
 if TYPE_CHECKING:
@@ -43,8 +46,6 @@ def _check_targets(options: AnalysisOptions) -> None:
 
     if options.json is not None and options.json != STDOUT:
         check_writable(Path(options.json))
-    if options.picture is not None:
-        check_writable(options.picture)
 
 
 def _demands(report: RigidityReport, options: AnalysisOptions) -> list[str]:
@@ -82,13 +83,7 @@ def run(model: Path, options: AnalysisOptions) -> None:
     from technic.rigidity.analyze import analyze as analyze_assembly
 
     _check_targets(options)
-    painter = None
-    if options.picture is not None:
-        from technic.report.render import Painter
-
-        # The drawing program starts while the analysis runs.
-        painter = Painter()
-    try:
+    with Outputs(options) as outputs:
         libraries = LibraryOptions(options.library, options.no_library, options.shadow)
         assembly = load(model, **reading(model, options.axle_slide, options.calibration, libraries))
         if options.fix:
@@ -108,15 +103,7 @@ def run(model: Path, options: AnalysisOptions) -> None:
         missed = _demands(report, options)
         for sentence in missed:
             typer.echo(f"technic: {sentence}", err=True)
-        if painter is not None and options.picture is not None:
-            from technic.report.picture import report_scene
-
-            painter.draw(report_scene(report), options.picture)
-            if not options.quiet:
-                typer.echo(f"picture: {options.picture}", err=True)
-    finally:
-        if painter is not None:
-            painter.close()
+        outputs.write(report)
     if missed:
         raise typer.Exit(_BELOW_DEMAND)
 
@@ -128,6 +115,8 @@ def analyze(
     ],
     json: JsonOption = None,
     picture: PictureOption = None,
+    report: ReportOption = None,
+    view: ViewOption = "mode",
     fix: FixOption = None,
     measure: MeasureOption = "mean_square",
     axle_slide: AxleSlideOption = "held",
@@ -147,6 +136,8 @@ def analyze(
         AnalysisOptions(
             json=json,
             picture=picture,
+            report=report,
+            view=view,
             fix=tuple(fix or ()),
             measure=measure,
             axle_slide=axle_slide,

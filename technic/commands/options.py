@@ -25,15 +25,19 @@ __all__ = [
     "PartModelOption",
     "PictureOption",
     "QuietOption",
+    "ReportOption",
     "RequireRigidOption",
     "ShadowOption",
+    "View",
+    "ViewOption",
 ]
 
 
 Measure = Literal["mean_square", "nodal"]
 AxleSlide = Literal["held", "free"]
 PartModel = Literal["frame", "rigid"]
-"""The values that `technic.rigidity.analyze.analyze` and the LDraw reader take."""
+View = Literal["iso", "front", "side", "top", "mode"]
+"""The values that `technic.rigidity.analyze.analyze`, the LDraw reader and the pictures take."""
 
 JsonOption = Annotated[
     str | None,
@@ -41,6 +45,17 @@ JsonOption = Annotated[
 ]
 PictureOption = Annotated[
     Path | None, typer.Option("--picture", metavar="PNG", help="Draw the result into a PNG file.")
+]
+ReportOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--report",
+        metavar="HTML",
+        help="Write a page with the model in 3D, its motions and tables.",
+    ),
+]
+ViewOption = Annotated[
+    View, typer.Option("--view", help="Of pictures; mode: the view that shows the worst mode best.")
 ]
 FixOption = Annotated[
     list[str] | None,
@@ -117,6 +132,8 @@ class AnalysisOptions:
 
     json: str | None = None
     picture: Path | None = None
+    report: Path | None = None
+    view: View = "mode"
     fix: tuple[str, ...] = ()
     measure: Measure = "mean_square"
     axle_slide: AxleSlide = "held"

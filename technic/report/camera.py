@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal, get_args
 
 import numpy as np
 
 from technic.geometry import Array
 from technic.report.scene import Camera
 
-__all__ = ["fit", "view_direction"]
+__all__ = ["VIEWS", "View", "fit", "fixed_direction", "view_direction"]
+
+View = Literal["iso", "front", "side", "top", "mode"]
+"""Names of views; `mode` is the one that shows the worst mode best."""
 
 _MARGIN = 1.06
 
@@ -31,6 +35,26 @@ def _direction(azimuth: float, elevation: float) -> Array:
     # LDraw: x right, y down, z away from the one who looks.
     a, e = np.radians(azimuth), np.radians(elevation)
     return np.array([np.sin(a) * np.cos(e), -np.sin(e), -np.cos(a) * np.cos(e)])
+
+
+VIEWS: tuple[View, ...] = get_args(View)
+
+_FIXED: dict[str, tuple[float, float, float]] = {
+    # The three axes equally long, as in an isometric drawing.
+    "iso": (1.0, -1.0, -1.0),
+    "front": (0.0, 0.0, -1.0),
+    "side": (1.0, 0.0, 0.0),
+    # Not quite from above, or "up" of the picture would be undefined.
+    "top": (0.0, -1.0, -1e-3),
+}
+
+
+def fixed_direction(view: View) -> Array | None:
+    """Return the unit vector from a model towards the eye of a fixed view; None for `mode`."""
+    if view not in _FIXED:
+        return None
+    toward = np.array(_FIXED[view])
+    return np.asarray(toward / np.linalg.norm(toward))
 
 
 def view_direction(points: Array, movement: Array | None = None, aspect: float = 1.5) -> Array:

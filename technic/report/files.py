@@ -9,7 +9,7 @@ from pathlib import Path
 
 from technic.errors import UsageError
 
-__all__ = ["check_writable", "write_atomic"]
+__all__ = ["check_writable", "write_atomic", "write_bytes"]
 
 
 def check_writable(path: Path) -> None:
@@ -63,3 +63,18 @@ def write_atomic(path: Path, write: Callable[[Path], None]) -> None:
         raise UsageError(f"{path} cannot be written: {error.strerror}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file in one move.
+
+    Raises
+    ------
+    UsageError
+        When the system refuses to write.
+    """
+    write_atomic(path, lambda temporary: _fill(temporary, content))
+
+
+def _fill(path: Path, content: bytes) -> None:
+    path.write_bytes(content)

@@ -11,9 +11,10 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Final
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 from technic.errors import SchemaError
 from technic.parts.catalogue import catalogue
@@ -27,14 +28,14 @@ _BRICKLINK: Final = {"32556a": "32556"}
 
 def wanted_xml(parts: Mapping[str, int]) -> str:
     """Return a wanted list for BrickLink."""
-    root = ElementTree.Element("INVENTORY")
+    root = ET.Element("INVENTORY")
     for number, n in sorted(parts.items()):
-        item = ElementTree.SubElement(root, "ITEM")
-        ElementTree.SubElement(item, "ITEMTYPE").text = "P"
-        ElementTree.SubElement(item, "ITEMID").text = _BRICKLINK.get(number, number)
-        ElementTree.SubElement(item, "MINQTY").text = str(n)
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="unicode") + "\n"
+        item = ET.SubElement(root, "ITEM")
+        ET.SubElement(item, "ITEMTYPE").text = "P"
+        ET.SubElement(item, "ITEMID").text = _BRICKLINK.get(number, number)
+        ET.SubElement(item, "MINQTY").text = str(n)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
 
 
 def wanted_csv(parts: Mapping[str, int]) -> str:
@@ -63,12 +64,11 @@ def write_parts_list(path: Path, parts: Mapping[str, int]) -> tuple[Path, Path]:
     """
     targets = path.with_suffix(".xml"), path.with_suffix(".csv")
     for target, text in zip(targets, (wanted_xml(parts), wanted_csv(parts)), strict=True):
-        content = text
-        write_atomic(target, lambda temporary, c=content: _write(temporary, c))
+        write_atomic(target, partial(_write, text))
     return targets
 
 
-def _write(path: Path, text: str) -> None:
+def _write(text: str, path: Path) -> None:
     path.write_text(text, encoding="utf-8")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from technic.geometry import Array
 from technic.parts.definition import PartDefinition
 from technic.report.arrows import arrow
-from technic.report.camera import fit, view_direction
+from technic.report.camera import View, fit, fixed_direction, view_direction
 from technic.report.drawing import (
     Drawing,
     deformation_scale,
@@ -185,22 +185,29 @@ def _elastic_panel(
     return panel, legend
 
 
-def report_scene(report: RigidityReport) -> Scene:
+def report_scene(
+    report: RigidityReport, *, drawing: Drawing | None = None, view: View = "mode"
+) -> Scene:
     """Return the picture of a report.
 
     Parameters
     ----------
     report : RigidityReport
         With at least one part.
+    drawing : Drawing, optional
+        Of the report's assembly, when it is there already.
+    view : {"iso", "front", "side", "top", "mode"}
+        Where to look from; `mode` shows the worst mode best.
     """
-    drawing = drawing_of(report.assembly)
+    drawing = drawing_of(report.assembly) if drawing is None else drawing
     field = worst_field(report)
     movement = None if field is None else field.displacements
     moving = motion_layers(report, drawing.points, drawing.solids, drawing.diagonal)
     side_by_side = moving is not None and field is not None
-    toward = view_direction(
-        np.concatenate(drawing.points), movement, _HALF_ASPECT if side_by_side else _WHOLE_ASPECT
-    )
+    toward = fixed_direction(view)
+    if toward is None:
+        aspect = _HALF_ASPECT if side_by_side else _WHOLE_ASPECT
+        toward = view_direction(np.concatenate(drawing.points), movement, aspect)
     panels: list[Panel] = []
     legend: list[LegendItem] = []
     if moving is not None:

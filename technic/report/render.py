@@ -14,7 +14,7 @@ from pathlib import Path
 
 import technic
 from technic.errors import MissingDependency
-from technic.report.files import write_atomic
+from technic.report.files import write_bytes
 from technic.report.scene import Scene
 
 __all__ = ["Painter"]
@@ -62,6 +62,16 @@ class Painter:
         UsageError
             When the file cannot be written.
         """
+        write_bytes(path, self.picture(scene))
+
+    def picture(self, scene: Scene) -> bytes:
+        """Return the picture of one scene as PNG.
+
+        Raises
+        ------
+        MissingDependency
+            When this machine cannot draw; the message says what to install.
+        """
         picture, why = None, ""
         for window in self._windows:
             process = self._process or _start(window)
@@ -80,8 +90,7 @@ class Painter:
                     else "On Debian or Ubuntu: apt install libegl1 libgl1-mesa-dri"
                 )
             )
-        content = picture
-        write_atomic(path, lambda temporary: _write(temporary, content))
+        return picture
 
     def close(self) -> None:
         """End the process if it was never asked to draw."""
@@ -89,10 +98,6 @@ class Painter:
         if process is not None:
             process.kill()
             process.communicate()
-
-
-def _write(path: Path, content: bytes) -> None:
-    path.write_bytes(content)
 
 
 def _ask(process: subprocess.Popen[bytes], scene: Scene) -> tuple[bytes | None, str]:

@@ -117,7 +117,9 @@ def _field(block: Block, movement: Field) -> dict[str, Any]:
     return found
 
 
-def _load(block: Block, report: RigidityReport, diagonal: float, scale: float, middle: Array) -> Any:
+def _load(
+    block: Block, report: RigidityReport, diagonal: float, scale: float, middle: Array
+) -> Any:
     sampled = worst_field(report)
     if sampled is None:
         return None

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from technic.report.drawing import Drawing, drawing_of
-from technic.report.files import write_atomic
+from technic.report.files import write_bytes
 from technic.report.html.pack import pack
 from technic.report.html.tables import (
     SPOT_ROWS,
@@ -114,7 +114,7 @@ def _facts(report: RigidityReport) -> list[tuple[str, str, str]]:
     said = [f"{mobility.spinning} spin", f"{mobility.sliding} slide", f"{mobility.idle} idle"]
     qualifier = f"{report.qualifier} " if report.qualifier else ""
     facts.append(("Motions", f"{qualifier}{mobility.structural}", "and " + ", ".join(said)))
-    size = " × ".join(number(value) for value in size_mm(report.assembly))
+    size = " x ".join(number(value) for value in size_mm(report.assembly))
     parts = count(len(report.assembly.parts), "part")
     facts.append(("Model", parts, f"{size} mm, {number(report.mass * 1e3)} g"))
     return facts
@@ -209,9 +209,4 @@ def write_page(
     UsageError
         When the file cannot be written.
     """
-    text = page(report, picture=picture, drawing=drawing)
-    write_atomic(path, lambda temporary: _write(temporary, text))
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")
+    write_bytes(path, page(report, picture=picture, drawing=drawing).encode("utf-8"))
