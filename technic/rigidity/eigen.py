@@ -27,6 +27,10 @@ Inverse = Callable[[Array], Array]
 SLOW = 1e-3
 """A mode this far below the shift converges slowly: the shift is lowered and the step repeated."""
 
+UNSEEN = 1e-13
+"""Inverse eigenvalues below this share of the largest are rounding: what moves there, the measure does not
+see."""
+
 DENSE = 400
 """Number of unknowns up to which a dense solver is as fast and simpler."""
 
@@ -104,7 +108,11 @@ def _dense(
     motions: sparse.csc_array,
     count: int,
 ) -> tuple[Inverse, float, Array]:
-    """Solve on the space that obeys the constraints and is M-orthogonal to the motions."""
+    """Solve on the space that obeys the constraints and is M-orthogonal to the motions.
+
+    There the stiffness is positive definite; the measure need not be (nodes that turn do not show in the
+    unweighted one), so ``M x = (1 / lambda) K x`` is solved, largest value first.
+    """
     m = measure.toarray()
     rows = np.vstack([constraints.toarray(), (m @ motions.toarray()).T])
     rows = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
@@ -114,13 +122,15 @@ def _dense(
     k = space.T @ (stiffness @ space)
     try:
         factor = linalg.cho_factor((k + k.T) / 2)
-        _, vectors = linalg.eigh((k + k.T) / 2, space.T @ m @ space)
+        inverse, vectors = linalg.eigh(space.T @ m @ space, (k + k.T) / 2)
     except linalg.LinAlgError as error:
         raise NumericalError(f"the stiffness matrix could not be factorised: {error}") from error
+    count = min(count, int(np.sum(inverse > UNSEEN * inverse[-1])))
+    vectors = (vectors / np.sqrt(np.maximum(inverse, 1e-300)))[:, ::-1]
     return (
         lambda load: space @ linalg.cho_solve(factor, space.T @ load),
         0.0,
-        (space @ vectors)[:, :count],
+        (space @ vectors[:, :count]),
     )
 
 
