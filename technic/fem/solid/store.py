@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import io
 import json
 import zipfile
 from collections.abc import Callable, Iterable, Mapping
@@ -278,7 +279,8 @@ def _archive() -> zipfile.ZipFile | None:
     path = files("parts_library").joinpath(FILE)
     if not path.is_file():
         return None
-    return zipfile.ZipFile(path.open("rb"))
+    # In memory (a few MB): no handle stays open, and it works from a zipped package too.
+    return zipfile.ZipFile(io.BytesIO(path.read_bytes()))
 
 
 def stored() -> tuple[str, ...]:
