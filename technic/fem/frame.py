@@ -31,7 +31,8 @@ def frame_element(body: FrameBody, properties: MassProperties, attachments: Arra
     """Return the element of a frame body with a node at every attachment.
 
     The density is scaled so that the element's mass is the part's true mass: bores and pockets are
-    not in the members.
+    not in the members. What the members lack in moment of inertia (material beyond the last bore, wide
+    flanges) is added to the rotation of the nodes.
 
     Parameters
     ----------
@@ -72,6 +73,7 @@ def frame_element(body: FrameBody, properties: MassProperties, attachments: Arra
     rigid = shift_twist(node_points - properties.centroid).reshape(6 * n, 6)
     unscaled = float(rigid[:, 0] @ mass @ rigid[:, 0])
     mass *= properties.mass / unscaled
+    _complete_inertia(mass, rigid, properties)
     frames = np.zeros((len(attachments), 6, 6 * n))
     for row, node in enumerate(node_of):
         frames[row, :, 6 * node : 6 * node + 6] = np.eye(6)
@@ -87,6 +89,21 @@ def frame_element(body: FrameBody, properties: MassProperties, attachments: Arra
         nodes=nodes,
         node_points=node_points,
     )
+
+
+def _complete_inertia(mass: Array, rigid: Array, properties: MassProperties) -> None:
+    """Add the missing moment of inertia about the centroid to the rotations of all nodes.
+
+    Only what is missing: where members have more than the part (a bent beam's corner counted twice),
+    nothing is taken away, so that the mass stays positive.
+    """
+    present = rigid[:, 3:].T @ mass @ rigid[:, 3:]
+    moments, axes = np.linalg.eigh(properties.inertia - present)
+    missing = (axes * np.clip(moments, 0.0, None)) @ axes.T
+    nodes = len(mass) // 6
+    for node in range(nodes):
+        own = slice(6 * node + 3, 6 * node + 6)
+        mass[own, own] += missing / nodes
 
 
 def _subdivide(
