@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from technic.loading import load, save
     from technic.rigidity.analyze import analyze
     from technic.rigidity.result import RigidityReport
+    from technic.design.suggest import suggest
     from technic.system.assemble import System, assemble
 
 __version__ = "0.1.0"
@@ -34,6 +35,7 @@ _HOMES = {
     "analyze": "technic.rigidity.analyze",
     "assemble": "technic.system.assemble",
     "load": "technic.loading",
+    "suggest": "technic.design.suggest",
     "save": "technic.loading",
 }
 """Where each public name lives."""
@@ -49,6 +51,7 @@ __all__ = [
     "assemble",
     "load",
     "save",
+    "suggest",
 ]
 
 

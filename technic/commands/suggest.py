@@ -148,8 +148,10 @@ def suggest(
     ] = "ritz",
     shortlist: Annotated[
         int,
-        typer.Option("--shortlist", min=1, max=1000, metavar="N", help="How many to re-analyse."),
-    ] = 24,
+        typer.Option(
+            "--shortlist", min=1, max=1000, metavar="N", help="How many to look at closely."
+        ),
+    ] = 50,
     apply: Annotated[
         int | None,
         typer.Option("--apply", min=1, metavar="RANK", help="Write the model with this one."),

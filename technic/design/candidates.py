@@ -15,7 +15,8 @@ from typing import Final
 import numpy as np
 
 from technic.assembly.model import Assembly
-from technic.design.sites import Bundle, Fastening, bundles
+from technic.design.placements import Placed, across_arms, along_line, place
+from technic.design.sites import Bundle, Fastening, Site, bundles
 from technic.errors import UsageError
 from technic.geometry import Array, Pose, readonly
 from technic.parts.catalogue import catalogue
@@ -156,11 +157,12 @@ def candidates(
             f"there is no straight beam with {unknown[0]} holes; there are "
             + ", ".join(map(str, STRAIGHT))
         )
-    numbers = [STRAIGHT[n] for n in lengths] + (list(BENT) if bent else [])
     found: list[Candidate] = []
     for bundle in bundles(assembly, exclude=exclude):
         for layer in _layers(bundle):
-            found += _layer_candidates(assembly, bundle, layer, numbers, max(snug, EXACT))
+            found += _layer_candidates(
+                bundle, layer, lengths, BENT if bent else (), max(snug, EXACT)
+            )
     return found
 
 
@@ -177,7 +179,11 @@ def _layers(bundle: Bundle) -> Iterator[list[int]]:
 
 
 def _layer_candidates(
-    assembly: Assembly, bundle: Bundle, layer: list[int], numbers: Sequence[str], tolerance: float
+    bundle: Bundle,
+    layer: list[int],
+    lengths: Sequence[int],
+    bent: Sequence[str],
+    tolerance: float,
 ) -> Iterator[Candidate]:
     from scipy.spatial import cKDTree
 
@@ -186,138 +192,81 @@ def _layer_candidates(
     sites = [bundle.sites[k] for k in layer]
     flat = np.array([bundle.lines[s.line].uv for s in sites])
     tree = cKDTree(flat)
-    pairs = tree.query_pairs(14 * PITCH + tolerance, output_type="ndarray")
+    near = tree.query_pairs((max(STRAIGHT) - 1) * PITCH + tolerance, output_type="ndarray")
+    held = [frozenset(s.fastening.parts) for s in sites]
     pairs = np.array(
-        [(i, j) for i, j in pairs if _ties(sites[i].fastening, sites[j].fastening)]
+        [(i, j) for i, j in near.tolist() if _ties(held[i], held[j])], dtype=np.intp
     ).reshape(-1, 2)
     if not len(pairs):
         return
-    seen: set[tuple[object, ...]] = set()
-    for number in numbers:
-        for angle, origin, turned in _placements(number, flat, pairs, tolerance, seen):
-            made = _candidate(bundle, sites, tree, number, angle, origin, turned, tolerance)
+    shorter = 1
+    beams: list[tuple[str, list[tuple[int, int]], bool]] = []
+    for length in lengths:
+        beams.append((STRAIGHT[length], along_line(length, shorter), True))
+        shorter = length
+    beams += [(number, across_arms(_beam(number)[1][:, [2, 0]]), False) for number in bent]
+    for number, wanted, straight in beams:
+        plane = _beam(number)[1][:, [2, 0]]
+        placed = place(plane, wanted, flat, pairs, tolerance, straight=straight)
+        if not len(placed.turns):
+            continue
+        distance, nearest = tree.query(placed.holes, distance_upper_bound=tolerance)
+        for k in range(len(placed.turns)):
+            holes = np.flatnonzero(np.isfinite(distance[k])).tolist()
+            hits = [(hole, int(nearest[k, hole])) for hole in holes]
+            made = _candidate(bundle, sites, number, placed, k, hits)
             if made is not None:
                 yield made
 
 
-def _ties(first: Fastening, second: Fastening) -> bool:
+def _ties(first: frozenset[int], second: frozenset[int]) -> bool:
     """Tell whether two fastenings tie parts together that neither of them holds alone."""
-    a, b = set(first.parts), set(second.parts)
-    return bool(a - b) and bool(b - a)
-
-
-def _placements(
-    number: str, flat: Array, pairs: Array, tolerance: float, seen: set[tuple[object, ...]]
-) -> Iterator[tuple[Array, Array, bool]]:
-    """Yield where a beam can lie by two of its holes: direction of its own z, its origin, turned over.
-
-    A straight beam lies by its end hole and any other when the distance asks for it (the shortest beam
-    that reaches, in every position along the line that covers both sites).
-    """
-    _, points, _ = _beam(number)
-    plane = points[:, [2, 0]]  # z along, x across
-    straight = number in STRAIGHT.values()
-    start, end = flat[pairs[:, 0]], flat[pairs[:, 1]]
-    between = end - start
-    distance = np.linalg.norm(between, axis=1)
-    wanted: list[tuple[int, int]]
-    if straight:
-        count = len(plane)
-        shorter = max((n for n in STRAIGHT if n < count), default=1)
-        wanted = [(i, i + k) for k in range(max(1, shorter), count) for i in range(count - k)]
-    else:
-        wanted = _across(plane)
-    for i, j in wanted:
-        span = plane[j] - plane[i]
-        length = float(np.linalg.norm(span))
-        for turned in (False,) if straight else (False, True):
-            hole = plane * np.array([1.0, -1.0]) if turned else plane
-            span = hole[j] - hole[i]
-            fits = np.flatnonzero(np.abs(distance - length) < 2 * tolerance)
-            for k in fits:
-                for a, b in ((start[k], end[k]), (end[k], start[k])):
-                    step = (b - a) / float(distance[k])
-                    along = _turn(span / length, step)
-                    # half of the mismatch at either end
-                    middle = (a + b) / 2 - _apply(along, (hole[i] + hole[j]) / 2)
-                    key = _key(number, along, middle, straight)
-                    if (key, turned) not in seen:
-                        seen.add((key, turned))
-                        yield along, middle, turned
-
-
-def _across(plane: Array) -> list[tuple[int, int]]:
-    """Return the pairs of holes of a bent beam that do not lie on one arm."""
-    step = np.diff(plane, axis=0)
-    step = step / np.linalg.norm(step, axis=1, keepdims=True)
-    turn = np.abs(step[1:, 0] * step[:-1, 1] - step[1:, 1] * step[:-1, 0]) > 0.1
-    arm = np.concatenate([[0, 0], np.cumsum(turn)])
-    corner = [k + 1 for k in np.flatnonzero(turn)]
-    return [
-        (i, j)
-        for i in range(len(plane))
-        for j in range(i + 1, len(plane))
-        if arm[i] != arm[j] and i not in corner and j not in corner
-    ]
-
-
-def _turn(a: Array, b: Array) -> Array:
-    """Return (cos, sin) of the rotation that takes direction a to direction b."""
-    return np.array([a @ b, a[0] * b[1] - a[1] * b[0]])
-
-
-def _apply(turn: Array, point: Array) -> Array:
-    c, s = turn
-    return np.asarray(point @ np.array([[c, s], [-s, c]]))
-
-
-def _key(number: str, turn: Array, middle: Array, straight: bool) -> tuple[object, ...]:
-    """Return what two equal placements share; a straight beam lies the same either way round."""
-    c, s = (round(float(v), 4) + 0.0 for v in turn)
-    if straight and (c < 0.0 or (c == 0.0 and s < 0.0)):
-        c, s = -c + 0.0, -s + 0.0
-    x, y = (round(float(v) / LDU * 4) for v in middle)
-    return (number, c, s, x, y)
+    return not (first <= second or second <= first)
 
 
 def _candidate(
     bundle: Bundle,
-    sites: list,  # type: ignore[type-arg]
-    tree,  # type: ignore[no-untyped-def]
+    sites: Sequence[Site],
     number: str,
-    turn: Array,
-    origin: Array,
-    turned: bool,
-    tolerance: float,
+    placed: Placed,
+    index: int,
+    hits: list[tuple[int, int]],
 ) -> Candidate | None:
-    """Return the beam with everything that can fasten it, or None when it ties nothing together."""
-    _, points, _ = _beam(number)
-    plane = points[:, [2, 0]] * (np.array([1.0, -1.0]) if turned else 1.0)
-    flat = _apply(turn, plane) + origin
-    distance, nearest = tree.query(flat, distance_upper_bound=tolerance)
-    hits = [(k, int(nearest[k])) for k in range(len(flat)) if np.isfinite(distance[k])]
-    chosen = _needed(flat, [(k, sites[s].fastening) for k, s in hits])
-    kept = [(k, s) for k, s in hits if k in chosen]
-    held = [sites[s].fastening for _, s in kept]
-    if not any(_ties(a, b) for a in held for b in held):
+    """Return the beam with what is to fasten it, or None when it ties nothing together.
+
+    `hits` are pairs of a hole and the site that it lies on.
+    """
+    flat = placed.holes[index]
+    chosen = _needed(flat, [(hole, sites[s].fastening) for hole, s in hits])
+    kept = [(hole, sites[s]) for hole, s in hits if hole in chosen]
+    held = [frozenset(site.fastening.parts) for _, site in kept]
+    if not any(_ties(a, b) for k, a in enumerate(held) for b in held[:k]):
         return None
     n, u, v = bundle.axes
-    t = float(np.mean([sites[s].t for _, s in kept]))
-    along = turn[0] * u + turn[1] * v
-    normal = n if not turned else -n
-    # part axes in the world: holes along y, the beam along z; x = y x z (or its mirror, turned over)
-    rotation = np.column_stack([np.cross(normal, along), normal, along]) + 0.0
-    world = origin[0] * u + origin[1] * v + t * n
-    offset = rotation @ np.array([0.0, points[0, 1], 0.0])
+    t = sum(site.t for _, site in kept) / len(kept)
+    cosine, sine = placed.turns[index]
+    along = cosine * u + sine * v
+    normal = -n if placed.turned_over[index] else n
+    # part axes in the world: holes along y, the beam along z; x = y x z
+    across = (cosine * v - sine * u) * (-1.0 if placed.turned_over[index] else 1.0)
+    rotation = np.column_stack([across, normal, along]) + 0.0
+    x, y = placed.origins[index]
+    origin = x * u + y * v + t * n - _beam(number)[1][0, 1] * normal
+    worst = 0.0
     attachments = []
-    for k, s in kept:
-        where = flat[k, 0] * u + flat[k, 1] * v + t * n
-        own = bundle.point(sites[s].line, sites[s].t)
-        attachments.append(
-            Attachment(k, tuple(map(float, where)), tuple(map(float, own)), sites[s].fastening)
-        )
-    mismatch = max(float(distance[k]) for k, _ in kept)
-    return Candidate(number, Pose(rotation, world - offset), n, tuple(attachments), mismatch)
+    for hole, site in kept:
+        x, y = flat[hole]
+        where = x * u + y * v + t * n
+        own = bundle.point(site.line, site.t)
+        across_line = (where - own) - ((where - own) @ n) * n
+        worst = max(worst, float(np.sqrt(across_line @ across_line)))
+        attachments.append(Attachment(hole, _triple(where), _triple(own), site.fastening))
+    return Candidate(number, Pose(rotation, origin), n, tuple(attachments), worst)
+
+
+def _triple(point: Array) -> tuple[float, float, float]:
+    x, y, z = point.tolist()
+    return x, y, z
 
 
 def _needed(flat: Array, hits: list[tuple[int, Fastening]]) -> set[int]:
@@ -336,8 +285,11 @@ def _needed(flat: Array, hits: list[tuple[int, Fastening]]) -> set[int]:
                 by_part.setdefault(p, []).append(k)
     chosen = {k for k, f in hits if f.kind == "present"}  # they hold, wanted or not
     for own in by_part.values():
-        middle = flat[own].mean(axis=0)
-        first = max(own, key=lambda k: (round(float(np.linalg.norm(flat[k] - middle)), 9), -k))
-        last = max(own, key=lambda k: (round(float(np.linalg.norm(flat[k] - flat[first])), 9), -k))
+        first, last = own[0], own[-1]
+        if len(own) > 2:
+            points = flat[own]
+            far = np.linalg.norm(points[:, None] - points[None], axis=2).round(9)
+            i, j = divmod(int(np.argmax(far)), len(own))
+            first, last = own[i], own[j]
         chosen |= {first, last}
     return chosen

@@ -18,7 +18,7 @@ import numpy as np
 import trimesh
 
 from technic.assembly.model import Part
-from technic.geometry import Array, Pose
+from technic.geometry import Array, Pose, axes_from
 from technic.parts.definition import PartDefinition
 from technic.parts.shapes import has_shape, mesh
 from technic.units import LDU, PITCH
@@ -134,7 +134,7 @@ class Surroundings:
         along = end - start
         length = float(np.linalg.norm(along))
         axis = along / length
-        frame = trimesh.geometry.align_vectors([0.0, 0.0, 1.0], axis)[:3, :3]
+        frame = axes_from(axis)[[1, 2, 0]].T  # the cylinder lies along its own z
         probe = fcl.CollisionObject(
             fcl.Cylinder(_SHAFT, length), fcl.Transform(frame, (start + end) / 2.0)
         )

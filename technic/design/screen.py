@@ -2,30 +2,32 @@
 
 The model's movements are taken as combinations of its motions that cost nothing and its lowest elastic
 modes. The new beam has its own unknowns, stiffness and mass; they follow from how its holes are held
-(static condensation), as do those of new pins. What is left for each candidate is an eigenvalue problem
-of the size of the combination, so a thousand candidates take a second.
+(`condense`). What is left for each candidate is an eigenvalue problem of the size of the combination,
+so a thousand candidates take a second.
+
+`Screen.refine` adds how the model gives way, statically, to loads at the very holes of one candidate:
+with these movements the forecast meets the re-analysis.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Final
 
 import numpy as np
 from scipy import linalg, sparse
+from scipy.sparse.linalg import splu
 
 from technic.assembly.model import Assembly
 from technic.assembly.stiffness import StiffnessTable, default_table
-from technic.design.candidates import Attachment, Candidate, holes_of
-from technic.fem.build import build_element
+from technic.design.candidates import Attachment, Candidate
+from technic.design.condense import Condensed, Hold, condensed, hold_of
 from technic.geometry import Array, shift_twist, turn_twist
-from technic.parts.catalogue import catalogue
 from technic.rigidity.eigen import elastic_modes
 from technic.rigidity.kinematics import component_motions, kinematics
 from technic.system.assemble import Probe, System, assemble
-from technic.system.inverse import single_thread
+from technic.system.inverse import ShiftedInverse, shifted_inverse, single_thread
 
 __all__ = ["MODES", "Forecast", "Screen"]
 
@@ -38,6 +40,9 @@ _STRUCTURE: Final = 1e-3
 
 _RANK: Final = 1e-6
 """A motion is removed when the beam resists it with more than this share of a pin's shear stiffness."""
+
+_SAME: Final = 1e-9
+"""Movements that add less than this (mean square, of unit ones) to the others add nothing."""
 
 Key = tuple[int, tuple[float, ...]]
 """A part and a place on it in the world (m)."""
@@ -53,14 +58,10 @@ class Forecast:
         Motions that the beam takes away.
     rigidity : float
         Predicted lowest eigenvalue (N/m).
-    projection : float
-        The paper's heuristic: how fast two holes of the beam approach each other in the model's
-        first motion (its worst mode when it is rigid), relative to its RMS displacement.
     """
 
     removed: int
     rigidity: float
-    projection: float
 
 
 class Screen:
@@ -84,25 +85,154 @@ class Screen:
         modes: int = MODES,
         table: StiffnessTable | None = None,
     ) -> None:
-        self._pin = (table or default_table()).get("pin/pin_hole").vector()
-        place: dict[Key, int] = {}
+        self._pin = tuple(float(v) for v in (table or default_table()).get("pin/pin_hole").vector())
+        self._assembly = assembly
+        self._place: dict[Key, int] = {}
         probes: list[Probe] = []
         for candidate in chosen:
             for attachment in candidate.attachments:
                 for key in _places(candidate, attachment):
-                    if key not in place:
-                        place[key] = len(probes)
+                    if key not in self._place:
+                        self._place[key] = len(probes)
                         probes.append(Probe(key[0], np.array(key[1])))
-        self._place = place
         system = assemble(assembly, probes=tuple(probes))
+        self._system = system
         self.mass = system.mass
-        basis, self.motions, self.values = _movements(assembly, system, modes)
-        self._twists = np.asarray(system.probes @ basis).reshape(len(probes), 6, -1)
+        self._moving, twists = _motions(assembly, system)
+        elastic = system.elastic
+        a = sparse.csr_array(system.A[elastic])
+        joints = a.T @ sparse.diags_array(system.rows.stiffness[elastic]) @ a
+        self._stiffness = sparse.csr_array(system.K + joints)
+        self._held = sparse.csr_array(system.A[~elastic])
+        pairs = elastic_modes(self._stiffness, system.M, self._held, self._moving, modes)
+        kept = _moving_structure(assembly, system, self._moving, twists)
+        self.motions = kept.shape[1]
+        self.values: Array = np.concatenate([np.zeros(self.motions), pairs.values])
+        self._basis = np.column_stack([kept, pairs.vectors])
+        self._twists = np.asarray(system.probes @ self._basis).reshape(len(probes), 6, -1)
+        self._inverse: ShiftedInverse | None = None
+        self._project: Callable[[Array], Array] | None = None
+        self._gives: dict[Key, Array] = {}
 
     def forecasts(self, chosen: Sequence[Candidate]) -> list[Forecast]:
         """Return what each of some candidates would do."""
         with single_thread():
             return [self._forecast(candidate) for candidate in chosen]
+
+    def _forecast(self, candidate: Candidate) -> Forecast:
+        change = self._condensed(candidate)
+        field = self._field(candidate)
+        stiffness = field.T @ change.stiffness @ field
+        inertia = field.T @ change.inertia @ field
+        removed = self._removed(stiffness, field)
+        stiffness[np.diag_indices_from(stiffness)] += self.values
+        inertia[np.diag_indices_from(inertia)] += self.mass
+        values = linalg.eigvalsh(
+            stiffness, inertia, check_finite=False, overwrite_a=True, overwrite_b=True
+        )
+        return self._lowest(values, removed, change)
+
+    def _removed(self, stiffness: Array, field: Array) -> int:
+        if not self.motions:
+            return 0
+        resisted = np.linalg.eigvalsh(stiffness[: self.motions, : self.motions])
+        largest = float(np.abs(field[:, : self.motions]).max(initial=0.0)) ** 2
+        return int(np.sum(resisted > _RANK * self._pin[1] * max(1.0, largest)))
+
+    def _lowest(self, values: Array, removed: int, change: Condensed) -> Forecast:
+        index = self.motions - removed
+        if index >= len(values):
+            return Forecast(removed, float("inf"))
+        return Forecast(removed, float(values[index]) * (self.mass + change.mass))
+
+    def refine(self, candidate: Candidate) -> Forecast:
+        """Return what a candidate would do, with the model's static answer at its holes taken in."""
+        places = self._layout(candidate)
+        with single_thread():
+            extra = np.column_stack(
+                [self._give(key) for key in dict.fromkeys(k for k, _ in places)]
+            )
+            weight = self._system.M
+            extra = self._without_motions(extra)
+            for _ in range(2):  # once more against rounding
+                extra = extra - self._basis @ (self._basis.T @ (weight @ extra))
+            gram = extra.T @ (weight @ extra)
+            size = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
+            values, mix = np.linalg.eigh(size[:, None] * gram * size)
+            good = values > _SAME
+            extra = extra @ (size[:, None] * mix[:, good] / np.sqrt(values[good]))
+            basis = np.column_stack([self._basis, extra])
+            change = self._condensed(candidate)
+            twists = np.asarray(self._system.probes[self._rows(places)] @ basis)
+            field = self._turned(candidate, places, twists.reshape(len(places), 6, -1))
+            own = field.T @ change.stiffness @ field
+            removed = self._removed(own, field)
+            count = self._basis.shape[1]
+            stiffness = own.copy()
+            stiffness[range(count), range(count)] += self.values
+            crossed = basis.T @ (self._stiffness @ extra)
+            stiffness[:, count:] += crossed
+            stiffness[count:, :count] += crossed[:count].T
+            inertia = field.T @ change.inertia @ field + self.mass * np.eye(len(own))
+            found = linalg.eigvalsh((stiffness + stiffness.T) / 2, inertia, check_finite=False)
+        return self._lowest(found, removed, change)
+
+    def _without_motions(self, movements: Array) -> Array:
+        """Take out what costs nothing, pins that turn in place included."""
+        weight = self._system.M
+        if self._project is None:
+            gram = sparse.csc_array(self._moving.T @ (weight @ self._moving))
+            self._project = splu(gram).solve
+        share = self._project(self._moving.T @ (weight @ movements))
+        return np.asarray(movements - self._moving @ share)
+
+    def _rows(self, places: list[tuple[Key, Array]]) -> Array:
+        first = np.array([6 * self._place[key] for key, _ in places])
+        return np.asarray((first[:, None] + np.arange(6)).ravel())
+
+    def _give(self, key: Key) -> Array:
+        """Return how the model gives way to unit loads at a place, (n, 6)."""
+        if key not in self._gives:
+            if self._inverse is None:
+                shift = max(float(self.values[self.motions :].min(initial=1.0)), 1e-3)
+                self._inverse = shifted_inverse(
+                    self._stiffness, self._system.M, self._held, self._moving, shift
+                )
+            first = 6 * self._place[key]
+            loads = self._system.probes[first : first + 6].toarray()
+            self._gives[key] = np.column_stack([self._inverse.solve(load) for load in loads])
+        return self._gives[key]
+
+    def projections(self, chosen: Sequence[Candidate]) -> list[float]:
+        """Return the paper's heuristic for each candidate.
+
+        It is the greatest speed at which two holes of the beam approach each other in the model's
+        internal motions that cost nothing, or in its worst mode when it has none.
+        """
+        return [self._projection(candidate) for candidate in chosen]
+
+    def _projection(self, candidate: Candidate) -> float:
+        first = self._internal()
+        moves, points = [], []
+        for attachment in candidate.attachments:
+            key = _places(candidate, attachment)[0]
+            arm = np.asarray(attachment.point) - np.asarray(key[1])
+            moves.append((shift_twist(arm) @ (self._twists[self._place[key]] @ first))[:3])
+            points.append(np.asarray(attachment.point))
+        best = 0.0
+        for i in range(len(points)):
+            for j in range(i):
+                along = points[i] - points[j]
+                along /= np.linalg.norm(along)
+                best = max(best, float(np.linalg.norm(along @ (moves[i] - moves[j]))))
+        return best
+
+    def _internal(self) -> Array:
+        """Return the movements that the heuristic looks at, as combinations of the basis."""
+        grounded = 0 if self._assembly.supports else 6
+        if self.motions > grounded:
+            return np.eye(len(self.values))[:, : self.motions]  # rigid motions bring no approach
+        return np.eye(len(self.values))[:, self.motions : self.motions + 1]
 
     def resists(self, candidate: Candidate, twists: dict[int, Array], points: Array) -> float:
         """Return the energy (J) that a candidate puts against a movement of rigid parts.
@@ -115,223 +245,82 @@ class Screen:
         points : (p, 3) ndarray
             Centroids of all parts (m).
         """
-        turn = turn_twist(candidate.pose.rotation.T)
-        kinds, blocks = self._layout(candidate)
-        moves = []
-        for key, arm in self._solid_places(candidate, blocks):
-            twist = twists.get(key[0], np.zeros(6))
-            moves.append(turn @ shift_twist(np.asarray(key[1]) + arm - points[key[0]]) @ twist)
-        field = np.concatenate(moves)
-        stiffness, _, _ = _condensed(candidate.number, kinds, tuple(self._pin))
-        return float(field @ stiffness @ field) / 2.0
-
-    def _solid_places(
-        self, candidate: Candidate, places: list[tuple[Key, Array]]
-    ) -> list[tuple[Key, Array]]:
-        """Return the places with parts of structure instead of the pins in them: a motion does not
-        list how pins turn in place.
-        """
         holders = {
             a.fastening.old_pin: a.fastening.parts[0]
             for a in candidate.attachments
             if a.fastening.old_pin >= 0 and a.fastening.parts
-        }
-        return [((holders.get(key[0], key[0]), key[1]), arm) for key, arm in places]
-
-    def _forecast(self, candidate: Candidate) -> Forecast:
-        stiffness, mass, field, added = self._change(candidate)
-        free = stiffness[: self.motions, : self.motions]
-        removed = 0
-        if self.motions:
-            resisted = np.linalg.eigvalsh(free)
-            removed = int(np.sum(resisted > _RANK * self._pin[1] * max(1.0, _largest(field))))
-        k = stiffness + np.diag(self.values)
-        m = mass + self.mass * np.eye(len(k))
-        values = linalg.eigvalsh(k, m, check_finite=False)
-        index = self.motions - removed
-        rigidity = float(values[index]) * (self.mass + added) if index < len(values) else np.inf
-        return Forecast(removed, rigidity, self._projection(candidate))
-
-    def _change(self, candidate: Candidate) -> tuple[Array, Array, Array, float]:
-        """Return what a candidate adds to the stiffness and the mass of the combination."""
+        }  # a motion does not say how pins turn in place: take the part that the pin is in
         turn = turn_twist(candidate.pose.rotation.T)
-        kinds, places = self._layout(candidate)
-        blocks = []
-        for key, arm in places:
-            twist = self._twists[self._place[key]]
-            blocks.append(turn @ (shift_twist(arm) @ twist if arm.any() else twist))
-        field = np.vstack(blocks)
-        stiffness, inertia, mass = _condensed(candidate.number, kinds, tuple(self._pin))
-        return field.T @ stiffness @ field, field.T @ inertia @ field, field, mass
+        moves = []
+        for (part, place), arm in self._layout(candidate):
+            owner = holders.get(part, part)
+            twist = twists.get(owner, np.zeros(6))
+            moves.append(turn @ shift_twist(np.asarray(place) + arm - points[owner]) @ twist)
+        field = np.concatenate(moves)
+        return float(field @ self._condensed(candidate).stiffness @ field) / 2.0
 
-    def _layout(
-        self, candidate: Candidate
-    ) -> tuple[tuple[tuple[int, tuple[float, ...]], ...], list[tuple[Key, Array]]]:
-        """Return how each hole is fastened, and what it feels: a place, and the arm to the hole."""
-        kinds, places = [], []
-        flip = float(np.sign(candidate.pose.rotation[:, 1] @ candidate.axis))
+    def _condensed(self, candidate: Candidate) -> Condensed:
+        holds: list[Hold] = []
         for attachment in candidate.attachments:
-            fastening = attachment.fastening
-            along = float(np.dot(attachment.line_point, candidate.axis))
-            offsets: tuple[float, ...] = ()
-            if fastening.kind == "pin":
-                offsets = tuple(round(flip * (t - along), 9) for _, t in fastening.bores)
-            kinds.append((attachment.hole, offsets))
+            pin = attachment.fastening.old_pin
+            old = self._assembly.parts[pin].definition if pin >= 0 else None
+            holds.append(hold_of(candidate, attachment, old))
+        return condensed(candidate.number, tuple(holds), self._pin)
+
+    def _field(self, candidate: Candidate) -> Array:
+        places = self._layout(candidate)
+        twists = self._twists[[self._place[key] for key, _ in places]]
+        return self._turned(candidate, places, twists)
+
+    @staticmethod
+    def _turned(candidate: Candidate, places: list[tuple[Key, Array]], twists: Array) -> Array:
+        """Return the movement at every place in the beam's axes, six rows each."""
+        turn = turn_twist(candidate.pose.rotation.T)
+        arms = np.array([arm for _, arm in places])
+        if arms.any():
+            twists = shift_twist(arms) @ twists
+        return np.asarray((turn @ twists).reshape(6 * len(places), -1))
+
+    def _layout(self, candidate: Candidate) -> list[tuple[Key, Array]]:
+        """Return what each hole feels, in the order of `condensed`: a place, and the arm to the hole."""
+        places = []
+        for attachment in candidate.attachments:
+            new = attachment.fastening.kind == "pin"
             for key in _places(candidate, attachment):
-                arm = np.zeros(3)
-                if not offsets:  # the pin's own movement, at the hole
-                    arm = np.asarray(attachment.point) - np.asarray(key[1])
+                # on a pin that is there already: the pin's own movement, at the hole
+                arm = np.zeros(3) if new else np.subtract(attachment.point, key[1])
                 places.append((key, arm))
-        return tuple(kinds), places
-
-    def _projection(self, candidate: Candidate) -> float:
-        """Return the greatest speed at which two holes of the beam approach in the first movement."""
-        first = [k for k in range(6, self.motions)] or [self.motions]
-        moves, points = [], []
-        for attachment in candidate.attachments:
-            keys = _places(candidate, attachment)
-            if not keys:
-                continue
-            arm = np.asarray(attachment.point) - np.asarray(keys[0][1])
-            moves.append((shift_twist(arm) @ self._twists[self._place[keys[0]]])[:3])
-            points.append(np.asarray(attachment.point))
-        best = 0.0
-        for i in range(len(points)):
-            for j in range(i):
-                along = points[i] - points[j]
-                along /= np.linalg.norm(along)
-                speed = along @ (moves[i] - moves[j])
-                best = max(best, float(np.linalg.norm(speed[first])))
-        return best
-
-
-def _largest(field: Array) -> float:
-    return float(np.abs(field).max(initial=0.0)) ** 2
+        return places
 
 
 def _places(candidate: Candidate, attachment: Attachment) -> list[Key]:
     """Return the parts, and where on them, whose movement an attachment feels."""
     fastening = attachment.fastening
     own = np.asarray(attachment.line_point)
+    if fastening.kind != "pin":
+        return [(fastening.old_pin, tuple(own.round(9).tolist()))]
     along = float(own @ candidate.axis)
-    if fastening.kind == "pin":
-        return [
-            (part, tuple((own + (t - along) * candidate.axis).round(9).tolist()))
-            for part, t in fastening.bores
-        ]
-    return [(fastening.old_pin, tuple(own.round(9).tolist()))]
+    return [
+        (part, tuple((own + (t - along) * candidate.axis).round(9).tolist()))
+        for part, t in fastening.bores
+    ]
 
 
-@lru_cache(maxsize=4096)
-def _condensed(
-    number: str, kinds: tuple[tuple[int, tuple[float, ...]], ...], pin: tuple[float, ...]
-) -> tuple[Array, Array, float]:
-    """Return stiffness and inertia of a beam on its fastenings, felt by what it is fastened to.
-
-    The unknowns left are the twists, in the beam's axes, of every hole that a new pin enters (at the
-    hole's middle) or of the present pin (at the beam's hole). Its own unknowns follow statically.
-    """
-    definition = catalogue().get(number)
-    assert definition is not None
-    names = holes_of(number)
-    points = np.array([definition.port(names[hole]).position for hole, _ in kinds])
-    element = build_element(definition.body, definition.mass_properties, points)
-    n = element.stiffness.shape[0]
-    count = sum(max(1, len(offsets)) for _, offsets in kinds)
-    own = np.array(element.stiffness)
-    cross = np.zeros((n, 6 * count))
-    outer = np.zeros((6 * count, 6 * count))
-    added = definition.mass_properties.mass
-    at = 0
-    for slot, (_, offsets) in enumerate(kinds):
-        block = _joint_block(offsets, pin)
-        size = 6 * max(1, len(offsets))
-        frame = element.frames[slot]
-        own += frame.T @ block[size:, size:] @ frame
-        cross[:, at : at + size] += frame.T @ block[size:, :size]
-        outer[at : at + size, at : at + size] += block[:size, :size]
-        at += size
-        added += _pin_mass(len(offsets)) if offsets else 0.0
-    follow = -linalg.solve((own + own.T) / 2, cross, assume_a="sym")
-    stiffness = outer + cross.T @ follow
-    inertia = follow.T @ element.mass @ follow
-    return (stiffness + stiffness.T) / 2, inertia, added
-
-
-@lru_cache(maxsize=64)
-def _pin_mass(holes: int) -> float:
-    definition = catalogue().get("2780" if holes == 1 else "6558")
-    assert definition is not None
-    return definition.mass_properties.mass
-
-
-@lru_cache(maxsize=256)
-def _joint_block(offsets: tuple[float, ...], pin: tuple[float, ...]) -> Array:
-    """Return the stiffness between holes (or a present pin) and a beam's hole, spin free.
-
-    The beam's holes lie along its y axis. With a new pin its six unknowns follow statically.
-    """
-    # order of held motions: axial, shear, shear, spin, tilt, tilt about [y, z, x]
-    single = np.zeros((6, 6))
-    for motion, axis in ((0, 1), (1, 2), (2, 0)):
-        single[axis, axis] = pin[motion]
-        single[3 + axis, 3 + axis] = pin[3 + motion]
-    if not offsets:
-        return np.block([[single, -single], [-single, single]])
-    m = len(offsets)
-    full = np.zeros((6 * (m + 2), 6 * (m + 2)))
-    body = slice(6 * (m + 1), 6 * (m + 2))
-    for k, offset in enumerate((*offsets, 0.0)):
-        reach = shift_twist(np.array([0.0, offset, 0.0]))
-        own = slice(6 * k, 6 * k + 6)
-        full[own, own] += single
-        full[own, body] -= single @ reach
-        full[body, own] -= reach.T @ single
-        full[body, body] += reach.T @ single @ reach
-    keep = np.arange(6 * (m + 1))
-    inner = full[body, body]
-    held = [0, 1, 2, 3, 5] if pin[3] == 0.0 else list(range(6))
-    cross = full[keep][:, body][:, held]
-    return np.asarray(
-        full[np.ix_(keep, keep)] - cross @ linalg.solve(inner[np.ix_(held, held)], cross.T)
-    )
-
-
-def _movements(assembly: Assembly, system: System, modes: int) -> tuple[Array, int, Array]:
-    """Return an M-orthonormal basis of motions that move structure and the lowest elastic modes.
-
-    Returns
-    -------
-    (n, m) ndarray, int, (m,) ndarray
-        Basis, how many of it are motions, stiffness of each (kg/s2 per unit of mean square, 0 for
-        motions).
-    """
+def _motions(assembly: Assembly, system: System) -> tuple[sparse.csc_array, sparse.csr_array]:
+    """Return all motions that cost nothing, as unknowns (n, k) and as scaled twists (6 p, k)."""
     kin = kinematics(assembly)
-    found = [component_motions(kin, c) for c in range(len(kin.components))]
-    scale = sparse.diags_array(np.tile(kin.units, len(assembly.parts)))
     columns = []
-    for motions in found:
+    for component in range(len(kin.components)):
+        motions = component_motions(kin, component)
         rows = np.concatenate([np.arange(6 * p, 6 * p + 6) for p in motions.parts])
         spread = sparse.csr_array(
             (np.ones(len(rows)), (rows, np.arange(len(rows)))),
             shape=(6 * len(assembly.parts), len(rows)),
         )
         columns.append(spread @ motions.twists)
-    moving = sparse.csc_array(system.R @ (scale @ sparse.hstack(columns)))
-    elastic = system.elastic
-    a = sparse.csr_array(system.A[elastic])
-    joints = a.T @ sparse.diags_array(system.rows.stiffness[elastic]) @ a
-    pairs = elastic_modes(
-        sparse.csr_array(system.K + joints),
-        system.M,
-        sparse.csr_array(system.A[~elastic]),
-        moving,
-        modes,
-    )
-    kept = _moving_structure(assembly, system, moving, sparse.csr_array(sparse.hstack(columns)))
-    basis = np.column_stack([kept, pairs.vectors])
-    values = np.concatenate([np.zeros(kept.shape[1]), pairs.values])
-    return basis, kept.shape[1], values
+    twists = sparse.csr_array(sparse.hstack(columns))
+    scale = sparse.diags_array(np.tile(kin.units, len(assembly.parts)))
+    return sparse.csc_array(system.R @ (scale @ twists)), twists
 
 
 def _moving_structure(

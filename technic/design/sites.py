@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from technic.assembly.model import Assembly, Part
 from technic.geometry import Array
@@ -123,7 +124,7 @@ class Bundle:
     def point(self, line: int, t: float) -> Array:
         """Return a place on a line in the world (m)."""
         u, v = self.lines[line].uv
-        return t * self.axes[0] + u * self.axes[1] + v * self.axes[2]
+        return np.asarray(t * self.axes[0] + u * self.axes[1] + v * self.axes[2])
 
 
 def bundles(assembly: Assembly, *, exclude: frozenset[int] = frozenset()) -> tuple[Bundle, ...]:
@@ -165,7 +166,7 @@ def _placed_more_than_once(parts: Sequence[Part]) -> frozenset[int]:
     )
 
 
-def _directions(axes: Array) -> list[tuple[Array, Array]]:
+def _directions(axes: Array) -> list[tuple[Array, NDArray[np.intp]]]:
     """Return the distinct directions of lines, and which rows of `axes` have each."""
     if not len(axes):
         return []
@@ -201,7 +202,9 @@ def _plane_axes(direction: Array) -> Array:
     return np.array([direction, across, np.cross(direction, across)]) + 0.0
 
 
-def _lines(placed: PlacedPorts, bores: Array, shafts: Array, axes: Array) -> tuple[Line, ...]:
+def _lines(
+    placed: PlacedPorts, bores: NDArray[np.intp], shafts: NDArray[np.intp], axes: Array
+) -> tuple[Line, ...]:
     from scipy.spatial import cKDTree
 
     place = placed.position[bores] @ axes.T

@@ -39,8 +39,8 @@ __all__ = [
 
 Rank = Literal["ritz", "paper"]
 
-SHORTLIST: Final = 24
-"""How many of the best buildable candidates are re-analysed."""
+SHORTLIST: Final = 50
+"""How many of the best buildable candidates get a refined forecast."""
 
 _RESISTED: Final = 1e-3
 """A motion is stopped when the beam resists it at least this much beside the one it resists most."""
@@ -164,7 +164,8 @@ def suggest(
     count : int
         Suggestions wanted.
     shortlist : int
-        Candidates to re-analyse, at least `count`.
+        Buildable candidates whose forecast is refined, at least `count`; the best of them are
+        re-analysed exactly.
     rank : {"ritz", "paper"}
         How candidates are put in order before: by Rayleigh-Ritz, or by the paper's projection.
     filters : Filters, optional
@@ -183,10 +184,9 @@ def suggest(
     """
     _check(assembly)
     filters = filters or Filters()
-    tell = progress or (lambda stage, done, total: None)
+    tell = progress or _silent
     before = before or analyze(assembly, modes=1)
     found = _filtered(
-        assembly,
         candidates(
             assembly,
             lengths=filters.lengths,
@@ -202,22 +202,27 @@ def suggest(
     tell("forecast", 0, len(found))
     screen = Screen(assembly, found)
     forecasts = screen.forecasts(found)
-    order = _order(forecasts, rank)
+    order = _order(screen, found, forecasts, rank)
     surroundings = Surroundings(assembly.parts)
     wanted = max(shortlist, count)
-    proven: list[Suggestion] = []
+    fitting: list[_Fitting] = []
     for k in order:
-        if len(proven) == wanted:
+        if len(fitting) == wanted:
             break
-        candidate = found[k]
-        change = change_of(assembly, candidate, color=color)
-        fit = _fit(assembly, surroundings, candidate, change)
+        change = change_of(assembly, found[k], color=color)
+        fit = _fit(surroundings, found[k], change)
         if isinstance(fit, str):
             refused[fit] += 1
             continue
-        tell("prove", len(proven), wanted)
-        made = extend(assembly, [change], axle_slide=axle_slide)
-        report = analyze(made, modes=1)
+        tell("check", len(fitting), wanted)
+        fitting.append(_Fitting(found[k], change, forecasts[k], screen.refine(found[k]), fit))
+    fitting.sort(key=lambda f: (-f.refined.removed, -f.refined.rigidity))
+    proven: list[Suggestion] = []
+    for place in fitting:
+        if len(proven) == count:
+            break
+        tell("prove", len(proven), count)
+        report = analyze(extend(assembly, [place.change], axle_slide=axle_slide), modes=1)
         why = _harm(before, report)
         if why:
             refused[why] += 1
@@ -225,20 +230,31 @@ def suggest(
         proven.append(
             Suggestion(
                 rank=0,
-                candidate=candidate,
-                change=change,
-                forecast=forecasts[k],
+                candidate=place.candidate,
+                change=place.change,
+                forecast=place.forecast,
                 report=report,
                 factor=_factor(before, report),
-                stops=_stops(screen, candidate, before, report),
+                stops=_stops(screen, place.candidate, before, report),
                 relieves=_relieves(before, report),
-                sides=fit,
+                sides=place.sides,
             )
         )
-    tell("prove", wanted, wanted)
+    tell("prove", count, count)
     proven.sort(key=lambda s: _merit(s.report), reverse=True)
-    best = tuple(replace(s, rank=n) for n, s in enumerate(proven[:count], start=1))
+    best = tuple(replace(s, rank=n) for n, s in enumerate(proven, start=1))
     return Suggestions(before, best, len(found), refused)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fitting:
+    """A candidate that can be built, on its way to the proof."""
+
+    candidate: Candidate
+    change: Change
+    forecast: Forecast
+    refined: Forecast
+    sides: tuple[str, ...]
 
 
 def reinforce(
@@ -294,10 +310,14 @@ def reinforce(
             done[-1] = replace(answer, suggestions=())
             break
         taken = answer.suggestions[0]
-        before = taken.report
+        previous, before = current, taken.report
         current = taken.report.assembly
-        filters = _used_up(assembly, current, filters, taken)
+        filters = _used_up(previous, current, filters, taken)
     return done
+
+
+def _silent(_stage: str, _done: int, _total: int) -> None:
+    """Tell nobody."""
 
 
 def _check(assembly: Assembly) -> None:
@@ -309,7 +329,7 @@ def _check(assembly: Assembly) -> None:
         raise UsageError("suggestions are made for a free model: leave --fix out")
 
 
-def _filtered(assembly: Assembly, found: Sequence[Candidate], filters: Filters) -> list[Candidate]:
+def _filtered(found: Sequence[Candidate], filters: Filters) -> list[Candidate]:
     kept = []
     for candidate in found:
         parts = candidate.parts
@@ -346,37 +366,39 @@ def _inside(candidate: Candidate, box: Sequence[Sequence[float]]) -> bool:
 def _used_up(start: Assembly, current: Assembly, filters: Filters, taken: Suggestion) -> Filters:
     """Return the filters for the next step: parts by their index in the changed assembly."""
     place = {part.id: k for k, part in enumerate(current.parts)}
-    earlier = taken.candidate
+    ids = [part.id for part in start.parts]
     inventory = filters.inventory
     if inventory is not None:
         left = Counter(inventory)
-        left.subtract(needs(earlier))
-        left.update(old.number for old in start.parts if old.id in taken.change.removed)
+        left.subtract(needs(taken.candidate))
+        left.update(_plain(old) for old in start.parts if old.id in taken.change.removed)
         inventory = dict(left)
-    return replace(filters, inventory=inventory, **_moved(start, place, filters))
+    between = filters.between
+    if between is not None:
+        between = (place[ids[between[0]]], place[ids[between[1]]])
+    keep_out = frozenset(place[ids[k]] for k in filters.keep_out if ids[k] in place)
+    return replace(filters, inventory=inventory, between=between, keep_out=keep_out)
 
 
-def _moved(start: Assembly, place: dict[str, int], filters: Filters) -> dict[str, object]:
-    ids = [part.id for part in start.parts]
-    return {
-        "keep_out": frozenset(place[ids[k]] for k in filters.keep_out if ids[k] in place),
-        "between": filters.between,
-    }
+def _plain(part: Part) -> str:
+    """Return the number that the catalogue knows a part by."""
+    return part.number if part.definition is None else part.definition.id
 
 
-def _order(forecasts: Sequence[Forecast], rank: Rank) -> list[int]:
-    def key(k: int) -> tuple[float, float, int]:
-        f = forecasts[k]
-        if rank == "paper":
-            return (-round(f.projection, 9), 0.0, k)
-        return (-f.removed, -float(f"{f.rigidity:.9g}"), k)
+def _order(
+    screen: Screen, found: Sequence[Candidate], forecasts: Sequence[Forecast], rank: Rank
+) -> list[int]:
+    if rank == "paper":
+        speeds = screen.projections(found)
+        return sorted(range(len(found)), key=lambda k: (-round(speeds[k], 9), k))
+    return sorted(
+        range(len(found)),
+        # rounded, so that rounding does not decide between twins
+        key=lambda k: (-forecasts[k].removed, -float(f"{forecasts[k].rigidity:.9g}"), k),
+    )
 
-    return sorted(range(len(forecasts)), key=key)
 
-
-def _fit(
-    assembly: Assembly, surroundings: Surroundings, candidate: Candidate, change: Change
-) -> tuple[str, ...] | str:
+def _fit(surroundings: Surroundings, candidate: Candidate, change: Change) -> tuple[str, ...] | str:
     """Return from where each new pin goes in, or why the candidate cannot be built."""
     old = {a.fastening.old_pin for a in candidate.attachments} - {-1}
     hits = surroundings.hits(candidate.definition, change.added[0].pose, old)

@@ -20,6 +20,7 @@ PUBLIC = [
     "assemble",
     "load",
     "save",
+    "suggest",
 ]
 """Taking one away breaks somebody's program: say so in CHANGELOG.md."""
 

@@ -1,0 +1,189 @@
+"""A new beam with its pins, condensed to what it is fastened to.
+
+The beam and the new pins have unknowns of their own; statically they follow from the movement of the
+holes and pins that hold them. What is left is a stiffness and an inertia felt at those places. All
+twists here are in the beam's own axes; its holes lie along y.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy import linalg
+
+from technic.design.candidates import Attachment, Candidate, holes_of
+from technic.errors import UsageError
+from technic.fem.build import build_element
+from technic.fem.element import Element
+from technic.geometry import Array, readonly, shift_twist
+from technic.parts.catalogue import catalogue
+from technic.parts.definition import PartDefinition
+
+__all__ = ["Condensed", "Hold", "condensed", "hold_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """How one hole of a beam is held, for the mechanics.
+
+    Parameters
+    ----------
+    hole : int
+    bores : tuple of float
+        Middles of the holes that a new pin enters, along y from the beam's hole (m); empty when the
+        hole is on a pin that is there already, short or long.
+    pin : str
+        Number of the new pin; empty for none.
+    center : float
+        Its middle, along y from the beam's hole (m).
+    old : str
+        Number of the pin that goes; its middle is `old_center`.
+    old_center : float
+    """
+
+    hole: int
+    bores: tuple[float, ...] = ()
+    pin: str = ""
+    center: float = 0.0
+    old: str = ""
+    old_center: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Condensed:
+    """Stiffness and inertia at the places that hold a beam, six rows each, and the mass it adds (kg)."""
+
+    stiffness: Array
+    inertia: Array
+    mass: float
+
+
+def hold_of(candidate: Candidate, attachment: Attachment, old: PartDefinition | None) -> Hold:
+    """Return how a hole of a candidate is held; `old` is the pin that is exchanged, if one is."""
+    fastening = attachment.fastening
+    flip = float(np.sign(candidate.pose.rotation[:, 1] @ candidate.axis))
+    along = float(np.dot(attachment.line_point, candidate.axis))
+
+    def local(t: float) -> float:
+        return round(flip * (t - along), 9) + 0.0
+
+    if fastening.kind == "present":
+        return Hold(attachment.hole)
+    center = local(fastening.center)
+    if fastening.kind == "pin":
+        bores = tuple(local(t) for _, t in fastening.bores)
+        return Hold(attachment.hole, bores, fastening.pin, center)
+    # a 3L pin reaches from the beam through both holes of the 2L pin
+    number = "" if old is None else old.id
+    return Hold(attachment.hole, (), fastening.pin, center, number, 1.5 * center)
+
+
+@lru_cache(maxsize=64)
+def _element(number: str) -> Element:
+    """Return a beam's element with a frame for each of its pin holes."""
+    definition = _definition(number)
+    points = np.array([definition.port(name).position for name in holes_of(number)])
+    return build_element(definition.body, definition.mass_properties, points)
+
+
+def _definition(number: str) -> PartDefinition:
+    definition = catalogue().get(number)
+    if definition is None:
+        raise UsageError(f"part {number} is not in the catalogue")
+    return definition
+
+
+@lru_cache(maxsize=64)
+def _pin_mass(number: str) -> tuple[float, Array]:
+    """Return mass (kg) and mass matrix of a pin about its middle, its axis along y."""
+    own = _definition(number).mass_properties
+    across = (own.inertia[1, 1] + own.inertia[2, 2]) / 2
+    inertia = [across, own.inertia[0, 0], across]
+    about = np.diag([own.mass] * 3 + inertia)
+    reach = shift_twist(np.array([0.0, own.centroid[0], 0.0]))
+    return own.mass, readonly(reach.T @ about @ reach)
+
+
+def _spring(pin: tuple[float, ...], *, spin: bool = False) -> Array:
+    """Return the stiffness of a pin in a hole; `spin`: held as well, where it costs nothing."""
+    single = np.zeros((6, 6))
+    for motion, axis in ((0, 1), (1, 2), (2, 0)):
+        single[axis, axis] = pin[motion]
+        single[3 + axis, 3 + axis] = pin[3 + motion]
+    if spin and single[4, 4] == 0.0:
+        single[4, 4] = pin[4]
+    return single
+
+
+@lru_cache(maxsize=4096)
+def condensed(number: str, holds: tuple[Hold, ...], pin: tuple[float, ...]) -> Condensed:
+    """Return a beam and its new pins, condensed.
+
+    Parameters
+    ----------
+    number : str
+        Of the beam.
+    holds : tuple of Hold
+    pin : tuple of float
+        Stiffness of a pin in a hole [axial, shear, shear, spin, tilt, tilt].
+
+    Returns
+    -------
+    Condensed
+        Places in the order of `holds`: each hole that a new pin enters, or the hole of the beam for
+        the movement of a pin that is there already.
+    """
+    element = _element(number)
+    n = element.stiffness.shape[0]
+    new_pins = sum(bool(hold.bores) for hold in holds)
+    places = sum(max(1, len(hold.bores)) for hold in holds)
+    own = np.zeros((n + 6 * new_pins, n + 6 * new_pins))
+    inertia = np.zeros_like(own)
+    own[:n, :n], inertia[:n, :n] = element.stiffness, element.mass
+    cross = np.zeros((len(own), 6 * places))
+    outer = np.zeros((6 * places, 6 * places))
+    heavy = np.zeros((6 * places, 6 * places))
+    mass = _definition(number).mass_properties.mass
+    place, body = 0, n
+    for hold in holds:
+        frame = element.frames[hold.hole]
+        if not hold.bores:
+            here = slice(6 * place, 6 * place + 6)
+            spring = _spring(pin)
+            own[:n, :n] += frame.T @ spring @ frame
+            cross[:n, here] -= frame.T @ spring
+            outer[here, here] += spring
+            for name, middle, sign in ((hold.pin, hold.center, 1), (hold.old, hold.old_center, -1)):
+                if name:
+                    weight, matrix = _pin_mass(name)
+                    reach = shift_twist(np.array([0.0, middle, 0.0]))
+                    heavy[here, here] += sign * reach.T @ matrix @ reach
+                    mass += sign * weight
+            place += 1
+            continue
+        weight, matrix = _pin_mass(hold.pin)
+        mass += weight
+        mine = slice(body, body + 6)
+        inertia[mine, mine] += matrix
+        # nothing turns the pin but the beam: then it turns with it
+        spring = _spring(pin, spin=True)
+        reach = shift_twist(np.array([0.0, -hold.center, 0.0]))
+        own[:n, :n] += frame.T @ spring @ frame
+        own[:n, mine] -= frame.T @ spring @ reach
+        own[mine, :n] -= reach.T @ spring @ frame
+        own[mine, mine] += reach.T @ spring @ reach
+        spring = _spring(pin)
+        for bore in hold.bores:
+            here = slice(6 * place, 6 * place + 6)
+            reach = shift_twist(np.array([0.0, bore - hold.center, 0.0]))
+            own[mine, mine] += reach.T @ spring @ reach
+            cross[mine, here] -= reach.T @ spring
+            outer[here, here] += spring
+            place += 1
+        body += 6
+    follow = -linalg.solve((own + own.T) / 2, cross, assume_a="sym")
+    stiffness = outer + cross.T @ follow
+    carried = heavy + follow.T @ inertia @ follow
+    return Condensed((stiffness + stiffness.T) / 2, (carried + carried.T) / 2, mass)
