@@ -80,7 +80,7 @@ def _how(assembly: Assembly, motion: Motion, parts: list[int], twists: Array) ->
             if motion.kind is MotionKind.SLIDING
             else ("shift" if many else "shifts")
         )
-        return f"{verb} along {_direction(shape.direction)}"
+        return f"{verb} along {_direction(shape.direction)}{_missing_stop(assembly, motion)}"
     if shape.point is None or shape.direction is None:
         return "move in several ways at once"
     verb = "turn" if many else "turns"
@@ -94,6 +94,23 @@ def _how(assembly: Assembly, motion: Motion, parts: list[int], twists: Array) ->
     )
     along = f", advancing {abs(shape.pitch) * 2 * np.pi / MM:.1f} mm a turn" if shape.pitch else ""
     return f"{verb} {about}{along}"
+
+
+def _missing_stop(assembly: Assembly, motion: Motion) -> str:
+    """Say on which side a stop would hold a sliding axle."""
+    sides: set[str] = set()
+    for k in motion.freed_by:
+        joint = assembly.joints[k]
+        signs = {"+": (1,), "-": (-1,), "both": (1, -1)}.get(joint.missing_stop, ())
+        for sign in signs:
+            axis = int(np.argmax(np.abs(joint.axes[0])))
+            positive = sign * joint.axes[0][axis] > 0.0
+            sides.add(f"{'+' if positive else '-'}{'xyz'[axis]}")
+    if not sides:
+        return ""
+    if len(sides) > 1:
+        return ": no stop holds it on either side"
+    return f": a stop is missing on its {sides.pop()} side"
 
 
 def _axis_part(
@@ -127,8 +144,8 @@ def _direction(direction: Array) -> str:
 
 
 def _place(point: Array) -> str:
-    x, y, z = point / MM
-    return f"({x:.0f}, {y:.0f}, {z:.0f}) mm"
+    x, y, z = (round(float(v)) for v in point / MM)
+    return f"({x}, {y}, {z}) mm"
 
 
 def reason(
