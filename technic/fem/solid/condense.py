@@ -257,6 +257,7 @@ def condense(part_id: str, solid: Solid, ports: Sequence[Port], *, key: str = ""
         merged=merged,
         condensation_error=error,
         fineness=fineness,
+        cell=mesh.settings.cell,
         key=key,
     )
 

@@ -16,7 +16,7 @@ import json
 import zipfile
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,7 @@ __all__ = [
     "FILE",
     "build",
     "element_key",
+    "has_solid_model",
     "load",
     "material_of",
     "read",
@@ -47,6 +48,28 @@ FILE = "super_elements.zip"
 
 VERSION = 1
 """Raised when the method changes in a way that changes the matrices."""
+
+ASSEMBLIES = (
+    "differential",
+    "hub",
+    "linear-actuator",
+    "motor",
+    "sensor",
+    "shock-absorber",
+    "turntable",
+    "universal-joint",
+    "wheel-rim",
+)
+"""Families (by their beginning) without a solid model: inner motion, or a block of unknown inside."""
+
+MOST_CELLS = 50_000
+"""Cells of the largest mesh: about 4 GB and three minutes."""
+
+CUT_SHARE = 1.7
+"""Cells per volume of a full cell, cut ones included (1.1 for bricks, 1.7 for thin walls)."""
+
+LARGEST_CELL = 2e-3
+"""Walls are 1.2 to 1.6 mm thick: larger cells would not resolve them (m)."""
 
 _DATE = (2020, 1, 1, 0, 0, 0)
 
@@ -69,6 +92,35 @@ def solid_ports(definition: PartDefinition) -> tuple[Port, ...]:
     """
     left_out = (PortKind.STOP, PortKind.STUD, PortKind.TUBE)
     return tuple(port for port in definition.ports if port.kind not in left_out)
+
+
+def has_solid_model(definition: PartDefinition) -> bool:
+    """Return whether a part gets a super-element, as far as its definition tells.
+
+    Parts need two frames to deform between; fasteners are rigid bodies or frame members (their
+    compliance is in the joints); assemblies with inner motion and electric units are no single solid.
+    """
+    return (
+        not definition.fastener
+        and len(solid_ports(definition)) > 1
+        and not definition.family.startswith(ASSEMBLIES)
+    )
+
+
+def _fitting(settings: MeshSettings, volume: float) -> MeshSettings:
+    """Return the settings with cells so much larger that a big part fits into memory.
+
+    Raises
+    ------
+    InputError
+        Even cells of `LARGEST_CELL` are too many.
+    """
+    cell = settings.cell
+    while CUT_SHARE * volume / cell**3 > MOST_CELLS:
+        cell *= 1.25
+    if cell > max(LARGEST_CELL, settings.cell):
+        raise InputError("the part is too large for a solid model")
+    return settings if cell == settings.cell else replace(settings, cell=cell)
 
 
 def _number(value: float) -> str:
@@ -116,8 +168,9 @@ def build(
     Parameters
     ----------
     definitions : iterable of PartDefinition
-        Parts without a shape or without ports are left out, with the reason.
+        Parts without a solid model are left out, with the reason.
     settings : MeshSettings, optional
+        Parts that would need more than `MOST_CELLS` get larger cells.
     jobs : int
         Processes; each uses one thread.
     progress : callable, optional
@@ -162,18 +215,19 @@ def _build_one(definition: PartDefinition, settings: MeshSettings) -> SuperEleme
 
     if not has_shape(definition):
         return "no solid shape"
-    if not solid_ports(definition):
-        return "no holes, pins, axles or balls"
+    if not has_solid_model(definition):
+        return "no solid model by its definition"
     made_of = material_of(definition)
     key = element_key(definition, made_of, settings)
     try:
+        surface = mesh(definition, "solid")
         with threadpool_limits(1):
             return build_super_element(
                 definition.id,
-                np.asarray(mesh(definition, "solid").triangles),
+                np.asarray(surface.triangles),
                 solid_ports(definition),
                 made_of,
-                settings,
+                _fitting(settings, float(surface.volume)),
                 key=key,
             )
     except TechnicError as fault:
@@ -189,6 +243,7 @@ def _pack(element: SuperElement, extra: Mapping[str, Any]) -> bytes:
         "key": element.key,
         "fineness": element.fineness,
         "condensation_error": element.condensation_error,
+        "cell": element.cell,
         **extra,
     }
     lower = np.tril_indices(6 * len(element.ports))
@@ -230,6 +285,7 @@ def _unpack(data: bytes) -> SuperElement:
         merged=tuple((a, b) for a, b in head["merged"]),
         condensation_error=head["condensation_error"],
         fineness=head["fineness"],
+        cell=head["cell"],
         key=head["key"],
     )
 

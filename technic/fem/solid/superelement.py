@@ -53,6 +53,8 @@ class SuperElement:
     fineness : float
         Smallest eigenvalue of the port flexibility relative to the largest (lengths scaled): how far
         the frames are from dependent.
+    cell : float
+        Edge of the cells it was meshed with (m).
     key : str
         Hash of definition, settings and material.
     """
@@ -66,6 +68,7 @@ class SuperElement:
     merged: tuple[tuple[str, str], ...] = ()
     condensation_error: float = 0.0
     fineness: float = 0.0
+    cell: float = 0.0
     key: str = ""
 
     def __post_init__(self) -> None:

@@ -101,6 +101,7 @@ def build_with_rigid_walls(
         stiffness=project_rigid((stiffness + stiffness.T) / 2.0, rigid_motions(points, centroid)),
         mass=(condensed + condensed.T) / 2.0,
         centroid=centroid,
+        cell=mesh.settings.cell,
         key=key,
     )
 
