@@ -28,6 +28,7 @@ __all__ = [
     "RigidBody",
     "Section",
     "TrussBody",
+    "outline",
 ]
 
 
@@ -262,6 +263,13 @@ class MeshBody:
 
 
 Body = RigidBody | FrameBody | TrussBody | PlateBody | MeshBody
+
+
+def outline(body: Body) -> Array:
+    """Return the points that a body spans, (n, 3), part coordinates; none for a rigid body."""
+    if isinstance(body, PlateBody):
+        return body.outline
+    return np.zeros((0, 3)) if isinstance(body, RigidBody) else body.points
 
 
 @dataclass(frozen=True, slots=True, eq=False)

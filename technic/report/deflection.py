@@ -14,7 +14,7 @@ import numpy as np
 from technic.assembly.model import Assembly, Support
 from technic.geometry import Array
 from technic.report.style import Style
-from technic.report.wording import DIRECTION_WORDS, count, direction_of, number, part_name
+from technic.report.wording import count, direction_of, direction_words, number, part_name
 from technic.rigidity.sentences import not_modelled
 from technic.rigidity.serialize import joint_stiffness
 from technic.statics.solve import Deflection, Load
@@ -141,12 +141,12 @@ def deflection_dict(case: StaticCase) -> dict[str, Any]:
     }
 
 
-def _way(vector: Array) -> str:
+def _way(assembly: Assembly, vector: Array) -> str:
     """Return size and main direction of a displacement given in metres."""
     size = float(np.linalg.norm(vector))
     if size == 0.0:
         return "0 mm"
-    return f"{number(size / MM)} mm {DIRECTION_WORDS[direction_of(vector)]}"
+    return f"{number(size / MM)} mm {direction_words(assembly)[direction_of(vector)]}"
 
 
 def _triple(vector: Array) -> str:
@@ -179,7 +179,7 @@ def _loads(case: StaticCase, style: Style) -> list[str]:
         lines += style.wrap(
             f"{_triple(load.force)} N on {part_name(assembly.parts[load.part], line=True)}"
             f"{' at ' + load.port if load.port else ''}: this point moves "
-            f"{_way(answer.probe_twists[k, :3])}.",
+            f"{_way(assembly, answer.probe_twists[k, :3])}.",
             " - ",
             "   ",
         )
@@ -190,7 +190,7 @@ def _loads(case: StaticCase, style: Style) -> list[str]:
         lines += style.wrap(
             f"Asked for: {part_name(assembly.parts[probe.part], line=True)}"
             f"{' at ' + probe.port if probe.port else ''} moves "
-            f"{_way(answer.probe_twists[k, :3])}.",
+            f"{_way(assembly, answer.probe_twists[k, :3])}.",
             " - ",
             "   ",
         )

@@ -13,9 +13,9 @@ from technic.report.pattern import describe_field
 from technic.report.phrases import FINDING_WORDS, merged_stiffness, motion_words
 from technic.report.style import Style
 from technic.report.wording import (
-    DIRECTION_WORDS,
     count,
     direction_of,
+    direction_words,
     number,
     part_name,
     part_names,
@@ -168,7 +168,7 @@ def _softest(report: RigidityReport, style: Style) -> list[str]:
         rest = len(parts) - _PUSHED_SHOWN
         lines += style.wrap(
             ", ".join(names) + (f" and {rest} more" if rest > 0 else ""),
-            f"   {DIRECTION_WORDS[side]}: ",
+            f"   {direction_words(assembly)[side]}: ",
             "        ",
         )
     return lines
@@ -213,8 +213,11 @@ def _weak_spots(report: RigidityReport, style: Style) -> list[str]:
     shown = report.weak_spots[:_SPOTS_SHOWN]
     lines = ["", style("bold", "Weakest spots (share of the strain energy of the softest way)")]
     for spot in shown:
+        where = spot_place(assembly, spot)
+        # without a file the place is the id, which the words have already
+        stands = "" if where.source is None and not where.name else f"; {place(where)}"
         lines += style.wrap(
-            f"{spot_words(assembly, spot)}; {place(spot_place(assembly, spot))}",
+            f"{spot_words(assembly, spot)}{stands}",
             f" {spot.rank:2d}. {100.0 * spot.energy_share:4.1f} %  ",
             "             ",
         )

@@ -19,6 +19,7 @@ __all__ = [
     "DIRECTION_WORDS",
     "count",
     "direction_of",
+    "direction_words",
     "joined",
     "number",
     "part_name",
@@ -37,6 +38,11 @@ DIRECTION_WORDS = {
 }
 """Directions of an LDraw model as one looks at it: x to the right, y down, z away."""
 
+_PLAIN_WORDS = {
+    (axis, sign): f"along {'-+'[sign > 0]}{'xyz'[axis]}" for axis, sign in DIRECTION_WORDS
+}
+"""Directions of an assembly file, which does not say where up is."""
+
 AXIS_WORDS = ("the x axis (left to right)", "the y axis (upright)", "the z axis (front to back)")
 
 
@@ -44,6 +50,11 @@ def direction_of(vector: Array) -> tuple[int, int]:
     """Return the model axis nearest to `vector` and the sign along it."""
     axis = int(np.argmax(np.abs(np.asarray(vector)).round(12)))
     return axis, 1 if vector[axis] >= 0.0 else -1
+
+
+def direction_words(assembly: Assembly) -> dict[tuple[int, int], str]:
+    """Return the words for the directions of a model, by what `direction_of` gives."""
+    return _PLAIN_WORDS if assembly.source.get("format") == "assembly" else DIRECTION_WORDS
 
 
 def number(value: float, digits: int = 3) -> str:

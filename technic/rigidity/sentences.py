@@ -211,6 +211,8 @@ def not_modelled(assembly: Assembly) -> tuple[str, ...]:
         out.append(f"{flexible} flexible {'item' if flexible == 1 else 'items'}")
     if any("gear" in (p.definition.family if p.definition else "") for p in assembly.parts):
         out.append("meshing of gears: each gear turns by itself")
-    if assembly.joints:
+    if assembly.joints and assembly.source.get("format") == "assembly":
+        out += ["friction in joints", "play that the file does not give", "contact between parts"]
+    elif assembly.joints:
         out += ["friction that keeps pins from turning", "play of pins in their holes", "contact"]
     return tuple(out)

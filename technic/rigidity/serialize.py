@@ -20,7 +20,7 @@ import numpy as np
 from technic.assembly.joint_types import MOTION_NAMES
 from technic.assembly.model import Assembly, FindingKind, Joint, Part
 from technic.geometry import Array
-from technic.parts.definition import PortKind
+from technic.parts.definition import PortKind, outline
 from technic.rigidity.result import (
     Component,
     Mobility,
@@ -79,11 +79,12 @@ def size_mm(assembly: Assembly) -> list[float]:
     """Return the extents (mm) of the box around all connection features, along the model's axes.
 
     The material around a bore is counted, outlines beyond the last feature (a wheel's rim, a panel)
-    are not.
+    are not. Shapes of an assembly file have no such features: their members, corners or nodes count.
     """
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for part in assembly.parts:
-        points, margins = [part.centroid], [np.zeros(3)]
+        corners = part.pose.points(outline(part.body)) if part.shape else []
+        points, margins = [part.centroid, *corners], [np.zeros(3)] * (1 + len(corners))
         for port in part.ports:
             axis = part.pose.directions(port.axis)
             ball = port.kind in (PortKind.BALL, PortKind.SOCKET)
