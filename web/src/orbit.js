@@ -3,15 +3,22 @@
 import { PerspectiveCamera, Vector3 } from "three";
 
 const FIELD = 26;
+const ROOM = 1.22; // for the deformation and the arrows
 const STEEPEST = 1.553;
 const UP = new Vector3(0, -1, 0); // LDraw: y points down
 const STILL = window.matchMedia("(prefers-reduced-motion: reduce)");
 
 export class Orbit {
-  /** @param {HTMLElement} element what is dragged; @param {number[]} half half extents of the model */
-  constructor(element, half, toward, changed) {
+  /**
+   * @param {HTMLElement} element what is dragged
+   * @param {object} contents of the model: half extents, outermost points, usual view
+   * @param {() => void} changed called when there is something new to draw
+   */
+  constructor(element, contents, changed) {
+    const { half, extremes, toward } = contents;
     this.element = element;
     this.half = half;
+    this.extremes = extremes.map((point) => new Vector3(...point));
     this.changed = changed;
     this.camera = new PerspectiveCamera(FIELD, 1, 1, 1000);
     this.target = new Vector3();
@@ -43,12 +50,14 @@ export class Orbit {
     const toward = this.toward();
     const right = new Vector3().crossVectors(UP, toward).normalize();
     const up = new Vector3().crossVectors(toward, right);
-    const reach = (axis) =>
-      Math.abs(axis.x) * this.half[0] + Math.abs(axis.y) * this.half[1] + Math.abs(axis.z) * this.half[2];
-    const half = Math.tan((FIELD * Math.PI) / 360);
-    const tall = reach(up) / half;
-    const wide = reach(right) / (half * Math.max(this.camera.aspect, 0.1));
-    return 1.16 * Math.max(tall, wide) + reach(toward);
+    const half = Math.tan((FIELD * Math.PI) / 360) / ROOM;
+    const wide = half * Math.max(this.camera.aspect, 0.1);
+    let distance = 0;
+    for (const point of this.extremes) {
+      const needed = Math.max(Math.abs(point.dot(up)) / half, Math.abs(point.dot(right)) / wide);
+      distance = Math.max(distance, needed + point.dot(toward));
+    }
+    return distance;
   }
 
   resize(width, height) {

@@ -17,7 +17,7 @@ const byId = (id) => document.getElementById(id);
 function said(value) {
   if (value === 0) return "0";
   const size = Math.floor(Math.log10(Math.abs(value)));
-  return value.toFixed(Math.max(0, 2 - size));
+  return String(Number(value.toFixed(Math.max(0, 2 - size))));
 }
 
 export class Viewer {
@@ -28,7 +28,7 @@ export class Viewer {
     this.dirty = true;
     this.playing = false;
     this.selected = -1;
-    this.orbit = new Orbit(this.canvas, model.contents.half, model.contents.toward, () => this.wake());
+    this.orbit = new Orbit(this.canvas, model.contents, () => this.wake());
     this.marks = new Marks(byId("marks"), model.contents.spots, (spot) => this.chooseSpot(spot));
     this.list = new PartList(this);
     this.frame = this.frame.bind(this);
@@ -108,9 +108,8 @@ export class Viewer {
     byId("amount").value = String(Math.round(100 * amount));
     let words = "";
     if (this.kind === "mode") {
-      words = `deformation at 1 N, × ${said(amount * scale)}`;
+      words = `deformation at 1 N, drawn × ${said(amount * scale)}`;
       byId("amount").setAttribute("aria-valuetext", words);
-      words += ` of × ${said(scale)}`;
     } else if (this.kind === "motion") {
       words = turns ? `${Math.round(180 * (amount + 1))}° of a turn` : `${Math.round(100 * amount)} % of the drawn swing`;
       byId("amount").setAttribute("aria-valuetext", words);

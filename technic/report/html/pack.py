@@ -68,6 +68,14 @@ class _Words:
         return self.texts.setdefault(text, len(self.texts))
 
 
+def _extremes(points: Array) -> list[list[float]]:
+    """Return the outermost points along a few dozen directions (mm): what a camera must see."""
+    steps = np.array(np.meshgrid(*[[-2, -1, 0, 1, 2]] * 3)).reshape(3, -1).T
+    directions = steps[np.abs(steps).max(axis=1) == 2]
+    found = np.unique((points @ directions.T).argmax(axis=0))
+    return [[round(float(v) / MM, 2) for v in points[k]] for k in found]
+
+
 def _parts(report: RigidityReport, drawing: Drawing, energy: Array, words: _Words) -> list[Any]:
     rows = []
     for k, part in enumerate(report.assembly.parts):
@@ -205,6 +213,7 @@ def pack(report: RigidityReport, drawing: Drawing, spots: int) -> tuple[dict[str
         "name": report.assembly.name,
         "count": len(parts),
         "half": [float(v) for v in 0.5 * (high - low) / MM],
+        "extremes": _extremes(everything - middle),
         "light": shapes.light,
         "toward": [float(v) for v in toward],
         "rotations": block.add(rotations, "float32"),
