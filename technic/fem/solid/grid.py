@@ -82,6 +82,8 @@ class Mesh:
         Node positions (m).
     owner : (nx, ny, nz) ndarray of int
         Element that each sub-cube of the grid belongs to; -1 where there is none.
+    core : (nx, ny, nz) ndarray of bool
+        Sub-cubes that are at least half full.
     loose : float
         Share of the volume left out because it is not connected to the rest.
     leaking : bool
@@ -97,6 +99,7 @@ class Mesh:
     nodes: NDArray[np.int64]
     points: Array
     owner: NDArray[np.int64]
+    core: NDArray[np.bool_]
     loose: float
     leaking: bool
     open_rays: float
@@ -107,11 +110,16 @@ class Mesh:
         return float(self.fill.sum()) * self.settings.sub**3
 
     def element_at(self, points: Array) -> NDArray[np.int64]:
-        """Return the element that owns the sub-cube around each point, -1 where there is none."""
+        """Return the element that owns the sub-cube around each point.
+
+        -1 where there is none, or where the sub-cube is less than half full: on average over places of
+        the grid the material then ends where the surface is.
+        """
         index = np.floor((points - self.origin) / self.settings.sub).astype(np.int64)
         valid = np.asarray((index >= 0) & (index < np.array(self.owner.shape))).all(axis=-1)
         index = np.where(np.asarray(valid)[..., None], index, 0)
-        return np.where(valid, self.owner[index[..., 0], index[..., 1], index[..., 2]], -1)
+        at = (index[..., 0], index[..., 1], index[..., 2])
+        return np.where(valid & self.core[at], self.owner[at], -1)
 
     def reference(self, points: Array, elements: NDArray[np.int64]) -> Array:
         """Return points in the reference coordinates (-1 to 1) of the given elements."""
@@ -183,6 +191,7 @@ def mesh_part(triangles: Array, settings: MeshSettings) -> Mesh:
         nodes=numbered,
         points=points,
         owner=owner,
+        core=fraction >= 0.5,
         loose=loose,
         leaking=filling.leaking,
         open_rays=filling.open_rays,
