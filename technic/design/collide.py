@@ -17,17 +17,20 @@ import manifold3d
 import numpy as np
 import trimesh
 
-from technic.assembly.model import Part
+from technic.assembly.model import Assembly, Part
 from technic.geometry import Array, Pose, axes_from
 from technic.parts.definition import PartDefinition
 from technic.parts.shapes import has_shape, mesh
 from technic.units import LDU, PITCH
 
-__all__ = ["PLAY", "Surroundings", "overlap", "push_side"]
+__all__ = ["PLAY", "Surroundings", "overlap", "push_side", "solid_overlaps"]
 
 PLAY: Final = 0.1e-3
 """New parts are tested this much smaller on every face (m): LEGO beams are 7.8 mm wide in a grid of 8
 and 0.05 to 0.1 mm short of their nominal depth."""
+
+_CUT: Final = 1e-10
+"""Common volume (m3) of solids that counts as a collision: 0.1 mm3, a hundredth of a pin's collar."""
 
 _SHAFT: Final = 5.0 * LDU
 """Radius of the probe that stands for a pin on its way in: the pin's own 6 less what slots and lips
@@ -219,3 +222,33 @@ def _matrix(pose: Pose) -> Array:
 
 LENGTH: Final = {"2780": 2 * PITCH, "6558": 3 * PITCH, "32556a": 3 * PITCH}
 """Length of the new pins (m)."""
+
+
+def solid_overlaps(
+    assembly: Assembly, new: Iterable[int], play: float = PLAY
+) -> list[tuple[str, str, float]]:
+    """Return which new parts share volume (m3) with other parts that they are not joined to.
+
+    A pin in a hole, and a beam on a pin, are joined, not colliding.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    new : iterable of int
+        Indices of the parts to test; parts without a shape are left out.
+    play : float
+        How much smaller the new parts are taken on every face (m).
+    """
+    joined = {frozenset(j.parts) for j in assembly.joints}
+    surroundings = Surroundings(assembly.parts)
+    found = []
+    done: set[int] = set()
+    for k in sorted(new):
+        for other in surroundings.around(k):
+            if other == k or other in done or frozenset((k, other)) in joined:
+                continue
+            volume = overlap(assembly.parts[k], assembly.parts[other], play)
+            if volume > _CUT:
+                found.append((assembly.parts[k].id, assembly.parts[other].id, volume))
+        done.add(k)
+    return found

@@ -16,7 +16,7 @@ import numpy as np
 from technic.assembly.model import Assembly, Joint, Part
 from technic.design.apply import HIGHLIGHT, Change, change_of, extend
 from technic.design.candidates import Candidate, candidates
-from technic.design.collide import LENGTH, PLAY, Surroundings, overlap, push_side
+from technic.design.collide import LENGTH, Surroundings, push_side
 from technic.design.screen import Forecast, Screen
 from technic.errors import UsageError
 from technic.geometry import Array
@@ -33,7 +33,6 @@ __all__ = [
     "Suggestions",
     "needs",
     "reinforce",
-    "solid_overlaps",
     "suggest",
 ]
 
@@ -44,9 +43,6 @@ SHORTLIST: Final = 50
 
 _RESISTED: Final = 1e-3
 """A motion is stopped when the beam resists it at least this much beside the one it resists most."""
-
-_CUT: Final = 1e-10
-"""Common volume (m3) of solids that counts as a collision: 0.1 mm3, a hundredth of a pin's collar."""
 
 Progress = Callable[[str, int, int], None]
 """Told the stage, how much of it is done, and how much there is."""
@@ -498,24 +494,3 @@ def _spot_id(report: RigidityReport, spot: WeakSpot) -> tuple[str, str]:
         report.assembly.joints if spot.kind == "joint" else report.assembly.parts
     )
     return spot.kind, items[spot.index].id
-
-
-def solid_overlaps(
-    assembly: Assembly, start: int, play: float = PLAY
-) -> list[tuple[str, str, float]]:
-    """Return the new parts (from index `start` on) that share volume (m3) with any other part.
-
-    A pin in a hole, and a beam on a pin, are joined, not colliding.
-    """
-    joined = {frozenset(j.parts) for j in assembly.joints}
-    surroundings = Surroundings(assembly.parts)
-    out = []
-    for k in range(start, len(assembly.parts)):
-        part = assembly.parts[k]
-        for other in surroundings.around(k):
-            if other == k or frozenset((k, other)) in joined or start <= other < k:
-                continue
-            volume = overlap(part, assembly.parts[other], play)
-            if volume > _CUT:
-                out.append((part.id, assembly.parts[other].id, volume))
-    return out
