@@ -111,3 +111,10 @@ DRIVEN_MOTION: Final = 1e-6
 
 STATIC_RESIDUAL: Final = 1e-10
 """The static solution has converged when the last step of refinement is this small beside the whole."""
+
+LATTICE_POINT: Final = 1e-3
+"""A point lies on the lattice when it is this close (LDU): exports of editors are off by 1e-4, and a tenth
+of an LDU is the finest step that a model on the grid uses."""
+
+LATTICE_DIRECTION: Final = 1e-5
+"""A direction is rational when it is this close to a fraction: files give six decimals."""

@@ -14,6 +14,7 @@ from scipy import sparse
 from technic.assembly.model import Assembly, FindingKind
 from technic.geometry import Array
 from technic.rigidity.eigen import elastic_modes
+from technic.rigidity.exact import lattice_rows, modular_rank
 from technic.rigidity.kinematics import (
     ComponentMotions,
     Kinematics,
@@ -144,7 +145,7 @@ def _body(kin: Kinematics, component: int) -> _Body:
         spinning=kinds.spinning,
         sliding=kinds.sliding,
         idle=kinds.idle,
-        proof="numerical",
+        proof=_proof(kin, motions, component),
         smallest_kept=motions.smallest_kept,
         largest_dropped=motions.largest_dropped,
     )
@@ -153,6 +154,17 @@ def _body(kin: Kinematics, component: int) -> _Body:
     else:
         verdict = Verdict.FLEXIBLE if mobility.structural else Verdict.RIGID
     return _Body(motions, kinds, mobility, verdict)
+
+
+def _proof(kin: Kinematics, motions: ComponentMotions, component: int) -> str:
+    """Return "exact" when the rank modulo a prime is as high as the numerical one."""
+    if kin.assembly.dimension == 2:
+        return "numerical"
+    rows = lattice_rows(kin, kin.links_of(component))
+    if rows is None:
+        return "numerical"
+    rank = 6 * len(motions.parts) - motions.twists.shape[1]
+    return "exact" if modular_rank(rows) == rank else "numerical"
 
 
 def _elastic(
