@@ -16,7 +16,7 @@ from typing import Annotated
 import typer
 
 from technic import __version__
-from technic.commands import analyze, deflect, demo, doctor, paper, parts, suggest
+from technic.commands import analyze, calibrate, deflect, demo, doctor, paper, parts, suggest
 from technic.errors import TechnicError
 
 __all__ = ["app", "main"]
@@ -33,6 +33,7 @@ app = typer.Typer(
 )
 app.command("analyze")(analyze.analyze)
 app.command("deflect")(deflect.deflect)
+app.command("calibrate")(calibrate.calibrate)
 app.command("demo")(demo.demo)
 app.command("doctor")(doctor.doctor)
 app.command("suggest")(suggest.suggest)

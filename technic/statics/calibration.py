@@ -167,7 +167,7 @@ def calibrate(
         found = fit(readings, forward, start, loss=loss, offsets=offsets)
     except FitError as error:
         raise InputError(str(error), path=path) from error
-    measured = _measured(parameters, found, candidates, forward)
+    measured = _measured(parameters, found, candidates, forward, {r.condition for r in readings})
     said = warnings(readings, found)
     said += [
         f"{m.parameter} cannot be told from these data{m.advice}" for m in measured if m.advice
@@ -187,12 +187,16 @@ def _candidates(rigs: Mapping[str, Rig], joints: set[str]) -> list[Condition]:
         for name, rig in rigs.items()
         if joints & set(rig.joints)
         for pose, entry in rig.poses.items()
-        for hole in rig.loads[:1]
+        for hole in rig.loads
     ]
 
 
 def _measured(
-    parameters: Sequence[Parameter], found: Fit, candidates: Sequence[Condition], forward: Forward
+    parameters: Sequence[Parameter],
+    found: Fit,
+    candidates: Sequence[Condition],
+    forward: Forward,
+    seen: set[Condition],
 ) -> tuple[Measured, ...]:
     out = []
     for k, parameter in enumerate(parameters):
@@ -203,11 +207,13 @@ def _measured(
             continue
         best = cure(k, candidates, forward, found)
         unit = UNITS[parameter.motion]
-        advice = f"; {value:g} {unit} of the table was taken. " + (
-            f"Measure also pose {best[0].pose} of rig {best[0].rig}."
-            if best is not None
-            else "No known rig tells it apart from the rest."
-        )
+        advice = f"; {value:g} {unit} of the table was taken, and what was found holds with it. "
+        if best is None:
+            advice += "No known rig tells it apart from the rest."
+        elif best[0] in seen:
+            advice += f"More readings in pose {best[0].pose} of rig {best[0].rig} would tell it."
+        else:
+            advice += f"Measure also pose {best[0].pose} of rig {best[0].rig}."
         out.append(Measured(parameter, value, None, identifiable=False, advice=advice))
     return tuple(out)
 

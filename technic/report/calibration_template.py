@@ -1,0 +1,56 @@
+"""What one needs to measure joints: empty table, schema, protocol, and the rigs to build."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import calibration
+from technic.errors import UsageError
+from technic.report.files import write_atomic
+
+__all__ = ["write_template"]
+
+_FILES = (
+    ("template", "readings.csv"),
+    ("template", "readings.schema.json"),
+    ("template", "protocol.md"),
+    ("rigs", "rigs.toml"),
+)
+
+
+def write_template(folder: Path) -> list[Path]:
+    """Write the files into a folder, which is made when it does not exist.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+
+    Raises
+    ------
+    UsageError
+        One of the files exists already (readings may be in it), or cannot be written.
+    """
+    root = calibration.files()
+    sources = [root.joinpath(*names) for names in _FILES]
+    sources += sorted(
+        (x for x in root.joinpath("rigs").iterdir() if x.name.endswith(".ldr")),
+        key=lambda x: x.name,
+    )
+    targets = [folder / source.name for source in sources]
+    there = [path.name for path in targets if path.exists()]
+    if there:
+        raise UsageError(f"{folder} already has {', '.join(there)}; name another directory")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"{folder} cannot be made: {error.strerror}") from error
+    for source, target in zip(sources, targets, strict=True):
+        content = source.read_bytes()
+        write_atomic(target, partial(_write, content))
+    return targets
+
+
+def _write(content: bytes, path: Path) -> None:
+    path.write_bytes(content)
