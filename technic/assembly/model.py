@@ -189,6 +189,8 @@ class FindingKind(StrEnum):
     """A part joined to nothing."""
     FLEXIBLE = "flexible"
     """Hose, chain, string, tyre: not modelled."""
+    GEARS = "gears"
+    """Two gears in mesh."""
     WARNING = "warning"
     """Anything else about the file."""
 

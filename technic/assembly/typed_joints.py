@@ -32,7 +32,7 @@ JITTER_MOMENT: Final = 0.01
 """The same for rotations (N m): the touch at an arm of 1 cm."""
 
 NEEDS_AXIS: Final = {
-    2: {JointType.SLIDER, JointType.PLANAR},
+    2: {JointType.SLIDER, JointType.PLANAR, JointType.MESH},
     3: {
         JointType.HINGE,
         JointType.SLIDER,
@@ -40,6 +40,7 @@ NEEDS_AXIS: Final = {
         JointType.PLANAR,
         JointType.UNIVERSAL,
         JointType.SLOT,
+        JointType.MESH,
     },
 }
 """Types that mean nothing without an axis, by dimension: in the plane a hinge turns about z."""

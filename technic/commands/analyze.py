@@ -14,6 +14,7 @@ from technic.commands.options import (
     AxleSlideOption,
     CalibrationOption,
     FixOption,
+    GearsOption,
     JsonOption,
     LibraryOption,
     MeasureOption,
@@ -29,7 +30,7 @@ from technic.commands.options import (
     ViewOption,
 )
 from technic.commands.outputs import Outputs
-from technic.commands.reading import LibraryOptions, reading
+from technic.commands.reading import ModelOptions, reading
 
 if TYPE_CHECKING:
     from technic.rigidity.result import RigidityReport
@@ -84,8 +85,8 @@ def run(model: Path, options: AnalysisOptions) -> None:
 
     _check_targets(options)
     with Outputs(options) as outputs:
-        libraries = LibraryOptions(options.library, options.no_library, options.shadow)
-        assembly = load(model, **reading(model, options.axle_slide, options.calibration, libraries))
+        more = ModelOptions(options.library, options.no_library, options.shadow, options.gears)
+        assembly = load(model, **reading(model, options.axle_slide, options.calibration, more))
         if options.fix:
             supports = tuple(parse_fix(assembly, text) for text in options.fix)
             assembly = replace(assembly, supports=assembly.supports + supports)
@@ -121,6 +122,7 @@ def analyze(
     measure: MeasureOption = "mean_square",
     axle_slide: AxleSlideOption = "held",
     calibration: CalibrationOption = None,
+    gears: GearsOption = "off",
     library: LibraryOption = None,
     no_library: NoLibraryOption = False,
     shadow: ShadowOption = None,
@@ -142,6 +144,7 @@ def analyze(
             measure=measure,
             axle_slide=axle_slide,
             calibration=calibration,
+            gears=gears,
             library=library,
             no_library=no_library,
             shadow=shadow,

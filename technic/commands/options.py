@@ -14,6 +14,8 @@ __all__ = [
     "AxleSlideOption",
     "CalibrationOption",
     "FixOption",
+    "Gears",
+    "GearsOption",
     "JsonOption",
     "LibraryOption",
     "Measure",
@@ -35,6 +37,7 @@ __all__ = [
 
 Measure = Literal["mean_square", "nodal"]
 AxleSlide = Literal["held", "free"]
+Gears = Literal["off", "on"]
 PartModel = Literal["frame", "rigid"]
 View = Literal["iso", "front", "side", "top", "mode"]
 """The values that `technic.rigidity.analyze.analyze`, the LDraw reader and the pictures take."""
@@ -83,6 +86,10 @@ CalibrationOption = Annotated[
         metavar="TOML",
         help="Stiffness table from `technic calibrate`, used instead of the shipped one.",
     ),
+]
+GearsOption = Annotated[
+    Gears,
+    typer.Option("--gears", help="on: gears in mesh turn each other, a worm locks its gear."),
 ]
 LibraryOption = Annotated[
     Path | None,
@@ -138,6 +145,7 @@ class AnalysisOptions:
     measure: Measure = "mean_square"
     axle_slide: AxleSlide = "held"
     calibration: Path | None = None
+    gears: Gears = "off"
     library: Path | None = None
     no_library: bool = False
     shadow: Path | None = None

@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from technic.errors import UsageError
 
-__all__ = ["LibraryOptions", "reading"]
+__all__ = ["ModelOptions", "reading"]
 
 
 @dataclass(frozen=True, slots=True)
-class LibraryOptions:
-    """Where parts come from that the catalogue does not have.
+class ModelOptions:
+    """How a model file is read: where unknown parts come from, and what moves.
 
     Parameters
     ----------
@@ -24,14 +24,17 @@ class LibraryOptions:
         Do not look for one.
     shadow : Path or None
         LDCad shadow library.
+    gears : {"off", "on"}
+        Whether gears in mesh turn each other.
     """
 
     library: Path | None = None
     no_library: bool = False
     shadow: Path | None = None
+    gears: Literal["off", "on"] = "off"
 
 
-def _sources(options: LibraryOptions) -> dict[str, Any]:
+def _sources(options: ModelOptions) -> dict[str, Any]:
     """Return the reader's `library` and `shadow`; both are opened when a part needs them.
 
     What is named must exist, whether it is needed or not: a wrong path is not passed over.
@@ -60,7 +63,7 @@ def reading(
     model: Path,
     axle_slide: str,
     calibration: Path | None = None,
-    libraries: LibraryOptions | None = None,
+    more: ModelOptions | None = None,
 ) -> dict[str, Any]:
     """Return the options of the reader; an assembly file says itself what its joints hold.
 
@@ -70,7 +73,7 @@ def reading(
     axle_slide : {"held", "free"}
     calibration : Path, optional
         Stiffness table to use instead of the shipped one.
-    libraries : LibraryOptions, optional
+    more : ModelOptions, optional
 
     Raises
     ------
@@ -86,13 +89,15 @@ def reading(
             raise UsageError(
                 "--calibration is for LDraw models; an assembly file gives its own stiffnesses"
             )
-        if libraries is not None and libraries != LibraryOptions():
+        if more is not None and more != ModelOptions():
             raise UsageError(
-                "--library and --shadow are for LDraw models: an assembly file has all"
+                "--library, --shadow and --gears are for LDraw models; an assembly file says it all"
             )
         return {}
     options: dict[str, Any] = {"axle_slide": axle_slide}
-    options |= _sources(libraries or LibraryOptions())
+    more = more or ModelOptions()
+    options |= _sources(more)
+    options["gears"] = more.gears
     if calibration is not None:
         from technic.assembly.stiffness import read_table
 

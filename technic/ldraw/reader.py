@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from technic.assembly.model import (
     Assembly,
@@ -22,15 +23,18 @@ from technic.assembly.model import (
     UnknownPart,
 )
 from technic.assembly.stiffness import StiffnessTable, default_table
-from technic.errors import InputError
+from technic.errors import InputError, UsageError
 from technic.geometry import Pose
 from technic.ldraw.connect import AxleSlide, connect
 from technic.ldraw.document import Document, Placement, placements, poses, read
 from technic.ldraw.finder import LibrarySource, PartFinder, ShadowSource
+from technic.ldraw.gears import find_meshes, mesh_findings, mesh_joints
 from technic.ldraw.library import LIBRARY_FAMILY
 from technic.parts.definition import PartDefinition
 
 __all__ = ["Reading", "load_ldraw", "lookup", "read_parts"]
+
+Gears = Literal["off", "on"]
 
 Lookup = Callable[[str], tuple[PartDefinition, Pose] | None]
 
@@ -68,6 +72,7 @@ def load_ldraw(
     table: StiffnessTable | None = None,
     library: LibrarySource = None,
     shadow: ShadowSource = None,
+    gears: Gears = "off",
 ) -> Assembly:
     """Read an LDraw model and find its connections.
 
@@ -84,6 +89,8 @@ def load_ldraw(
         called when the first such part is met.
     shadow : ShadowLibrary or callable, optional
         LDCad shadow library: connectors of the library's parts.
+    gears : {"off", "on"}
+        Whether gears in mesh turn each other, or each by itself.
 
     Returns
     -------
@@ -96,6 +103,8 @@ def load_ldraw(
     """
     document = read(path)
     find = PartFinder(library, shadow, document)
+    if gears not in ("off", "on"):
+        raise UsageError(f"gears is 'off' or 'on', not {gears!r}")
     reading = read_parts(document, find, find.refused)
     if not reading.parts:
         raise InputError(
@@ -106,13 +115,20 @@ def load_ldraw(
             if find.library is None
             else "The parts library does not have them either.",
         )
-    joints, findings = connect(reading.parts, table or default_table(), axle_slide=axle_slide)
+    table = table or default_table()
+    joints, findings = connect(reading.parts, table, axle_slide=axle_slide)
+    meshes = find_meshes(reading.parts)
+    coupled = mesh_joints(reading.parts, meshes, joints, table) if gears == "on" else None
     return Assembly(
         name=Path(document.main.name).stem,
         parts=reading.parts,
-        joints=joints,
+        joints=joints + (coupled or ()),
         unknown=reading.unknown,
-        findings=(*reading.findings, *findings),
+        findings=(
+            *reading.findings,
+            *findings,
+            *mesh_findings(reading.parts, meshes, coupled),
+        ),
         source={"path": str(path), "sha256": document.sha256, "format": "ldraw"},
         imported=_summary(reading.parts, find, searched=library is not None),
     )

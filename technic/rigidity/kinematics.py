@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from technic.assembly.joint_types import JointType
 from technic.assembly.model import Assembly
 from technic.geometry import Array, shift_twist
 from technic.groups import connected_groups
@@ -77,10 +78,20 @@ class Kinematics:
                 out[p].append(k)
         return tuple(tuple(links) for links in out)
 
-    def links_of(self, component: int) -> list[int]:
-        """Return the joints and supports of a component."""
+    @cached_property
+    def meshes(self) -> frozenset[int]:
+        """Links that are gears in mesh: they tie motions of bodies that other joints leave free."""
+        joints = self.assembly.joints
+        return frozenset(k for k, joint in enumerate(joints) if joint.type is JointType.MESH)
+
+    def links_of(self, component: int, *, meshes: bool = True) -> list[int]:
+        """Return the joints and supports of a component, with or without the gears in mesh."""
         own = self.component_of
-        return [k for k, owner in enumerate(self.owners) if own[owner[0]] == component]
+        return [
+            k
+            for k, owner in enumerate(self.owners)
+            if own[owner[0]] == component and (meshes or k not in self.meshes)
+        ]
 
     @property
     def units(self) -> Array:
@@ -157,14 +168,14 @@ def _components(assembly: Assembly) -> tuple[tuple[int, ...], ...]:
 
 
 def component_motions(
-    kin: Kinematics, component: int, cut: float = MOBILITY_CUT
+    kin: Kinematics, component: int, cut: float = MOBILITY_CUT, *, meshes: bool = True
 ) -> ComponentMotions:
     """Return the null space of one component: every motion in which each joint is respected.
 
-    Singular values below `cut` count as motions.
+    Singular values below `cut` count as motions. Without `meshes`, gears slip through each other.
     """
     parts = kin.components[component]
-    links = kin.links_of(component)
+    links = kin.links_of(component, meshes=meshes)
     dofs = kin.dofs
     width = len(dofs)
     grounded = any(len(kin.owners[k]) == 1 for k in links)

@@ -13,12 +13,13 @@ import numpy as np
 
 from technic.geometry import Array, shift_twist
 from technic.rigidity.clusters import Cluster, LocalMotion, find_clusters
-from technic.rigidity.kinematics import ComponentMotions, Kinematics
+from technic.rigidity.kinematics import ComponentMotions, Kinematics, component_motions
 from technic.rigidity.order import FIRST_ORDER, split_by_order
 from technic.rigidity.result import Motion, MotionKind
 from technic.rigidity.screw import describe_twists
 from technic.rigidity.structural import structural_space
 from technic.rigidity.symmetry import is_rotor
+from technic.rigidity.trains import tie
 from technic.tolerances import MOTION_KIND_CUT, SAME_LINE
 
 __all__ = ["SortedMotions", "sort_motions"]
@@ -52,8 +53,12 @@ def sort_motions(kin: Kinematics, motions: ComponentMotions, component: int) -> 
     SortedMotions
         ``structural + spinning + sliding + idle`` is `motions.internal`.
     """
-    links = kin.links_of(component)
-    clusters = find_clusters(kin, motions, links)
+    links = kin.links_of(component, meshes=False)
+    meshes = [k for k in kin.links_of(component) if k in kin.meshes]
+    # Gears in mesh tie wheels that each turn by themselves otherwise: what a body is, is told
+    # without them, and how much of its motion is left, with them.
+    free = component_motions(kin, component, meshes=False) if meshes else motions
+    clusters = find_clusters(kin, free, links)
     if motions.internal <= 0:
         return SortedMotions(0, 0, 0, 0, (), tuple(clusters))
     grounded = motions.rigid == 0
@@ -77,15 +82,15 @@ def sort_motions(kin: Kinematics, motions: ComponentMotions, component: int) -> 
         grounded=grounded,
     )
     structural = split_by_order(kin, motions, component, space)
-    spinning = sum(kind is MotionKind.SPINNING for kind, _, _ in local)
-    sliding = sum(kind is MotionKind.SLIDING for kind, _, _ in local)
+    kept, trains = tie(kin, meshes, local)
+    spinning, sliding = kept[MotionKind.SPINNING], kept[MotionKind.SLIDING]
     idle = motions.internal - len(structural) - spinning - sliding
     out = [
         _motion(kin, component, MotionKind.STRUCTURAL, clusters, space.of_clusters(vector), order)
         for vector, order in structural
     ]
-    for kind, cluster, motion in local:
-        out.append(_motion(kin, component, kind, [cluster], motion.twist[None]))
+    for train in trains:
+        out.append(_motion(kin, component, train.kind, list(train.clusters), train.twists))
     kinds = list(MotionKind)
     out.sort(key=lambda m: (kinds.index(m.kind), m.order == FIRST_ORDER, -len(m.parts)))
     return SortedMotions(len(structural), spinning, sliding, idle, tuple(out), tuple(clusters))
@@ -183,7 +188,7 @@ def _freed_by(kin: Kinematics, parts: list[int], twists: Array) -> tuple[int, ..
     out = []
     for k in sorted({k for p in parts for k in kin.touching[p]}):
         owner = kin.owners[k]
-        if len(owner) != 2:
+        if len(owner) != 2 or k in kin.meshes:
             continue
         slip = sum(
             (kin.sides[k, s] @ scaled[p] for s, p in enumerate(owner) if p in scaled), np.zeros(6)

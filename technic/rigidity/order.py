@@ -76,6 +76,8 @@ def _finite_directions(
 ) -> Array:
     """Return an orthonormal basis, (6 * bodies, f), of the motions that have a path."""
     links = kin.links_of(component)
+    # Teeth roll on each other: where they touch is no point of either gear, so they are not closed.
+    closing = kin.links_of(component, meshes=False)
     best = np.zeros((len(space.basis), 0))
     cut = min(max(CUT, 10.0 * motions.largest_dropped), MOBILITY_CUT)
     for trial in range(TRIALS):
@@ -83,7 +85,7 @@ def _finite_directions(
         twists = space.lift(motions, space.basis @ share)
         twists = twists * (STEP / np.abs(twists).max())
         there = step(start(kin, motions.parts), twists * kin.units)
-        placement = close_joints(kin, motions.parts, links, there)
+        placement = close_joints(kin, motions.parts, closing, there)
         if placement is None or _progress(kin, motions, placement, there) < MOVED:
             continue
         moved = kinematics(placed_assembly(kin, motions.parts, links, placement))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from technic.assembly.joint_types import JointType
 from technic.assembly.model import Assembly, FindingKind, Part
 from technic.geometry import Array
 from technic.parts.definition import PortKind
@@ -209,8 +210,12 @@ def not_modelled(assembly: Assembly) -> tuple[str, ...]:
     flexible = sum(f.kind is FindingKind.FLEXIBLE for f in assembly.findings)
     if flexible:
         out.append(f"{flexible} flexible {'item' if flexible == 1 else 'items'}")
-    if any("gear" in (p.definition.family if p.definition else "") for p in assembly.parts):
-        out.append("meshing of gears: each gear turns by itself")
+    meshed = any(joint.type is JointType.MESH for joint in assembly.joints)
+    geared = any("gear" in (p.definition.family if p.definition else "") for p in assembly.parts)
+    if geared and not meshed:
+        pairs = sum(f.kind is FindingKind.GEARS for f in assembly.findings)
+        known = f" ({pairs} in mesh; --gears on couples them)" if pairs else ""
+        out.append(f"meshing of gears: each gear turns by itself{known}")
     if assembly.joints and assembly.source.get("format") == "assembly":
         out += ["friction in joints", "play that the file does not give", "contact between parts"]
     elif assembly.joints:

@@ -83,7 +83,8 @@ def size_mm(assembly: Assembly) -> list[float]:
     """
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for part in assembly.parts:
-        corners = part.pose.points(outline(part.body)) if part.shape else []
+        shown = outline(part.body) if part.shape else np.zeros((0, 3))
+        corners = part.pose.points(shown)
         points, margins = [part.centroid, *corners], [np.zeros(3)] * (1 + len(corners))
         for port in part.ports:
             axis = part.pose.directions(port.axis)
@@ -260,7 +261,7 @@ def _model(report: RigidityReport) -> dict[str, Any]:
             if finding.kind in kinds
         ]
 
-    apart = (FindingKind.NEAR_MISS, FindingKind.OPEN_PORT)
+    apart = (FindingKind.NEAR_MISS, FindingKind.OPEN_PORT, FindingKind.GEARS)
     return {
         "name": assembly.name,
         "parts": len(assembly.parts),
@@ -280,6 +281,7 @@ def _model(report: RigidityReport) -> dict[str, Any]:
         ],
         "import": _imported(report),
         "near_misses": details(FindingKind.NEAR_MISS),
+        "gear_meshes": details(FindingKind.GEARS),
         "open_ports": len(details(FindingKind.OPEN_PORT)),
         "open_port_list": details(FindingKind.OPEN_PORT),
         "warnings": details(*(kind for kind in FindingKind if kind not in apart)),

@@ -10,12 +10,13 @@ import pytest
 from technic.assembly.joint_types import JointType
 from technic.assembly.stiffness import MOTIONS, default_table, read_table
 from technic.errors import InputError, SchemaError, UsageError
+from technic.ldraw.gears import CONNECTION as GEARS
 from technic.ldraw.matching import MATES
 from technic.ldraw.seats import TURNTABLE, TYRE
 
 
 def test_every_connection_has_an_entry():
-    assert {*MATES.values(), TYRE, TURNTABLE} == set(default_table().connections)
+    assert {*MATES.values(), TYRE, TURNTABLE, GEARS} == set(default_table().connections)
 
 
 def test_pin_has_the_papers_values():
