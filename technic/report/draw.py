@@ -1,4 +1,4 @@
-"""The drawing process: reads a scene from standard input, writes a PNG to standard output.
+"""The drawing process: reads a scene from standard input, writes a PNG (of a film: a GIF) to standard output.
 
 Run as ``python -m technic.report.draw`` by `technic.report.render`. VTK draws the panels; Pillow puts
 title, captions, scale bar, markers and legend around them, each in a place of its own.
@@ -16,9 +16,10 @@ import numpy as np
 import pyvista
 import pyvista.plotting
 from numpy.typing import NDArray
+from PIL import Image
 
 from technic.report.layout import Sheet
-from technic.report.scene import Lines, Panel, Scene, Surface
+from technic.report.scene import Film, Lines, Panel, Scene, Surface
 
 __all__ = ["main", "paint"]
 
@@ -112,15 +113,35 @@ def paint(panel: Panel, size: tuple[int, int]) -> tuple[NDArray[np.uint8], float
     return np.asarray(image)[:, :, :3], 0.5 * size[1] / half
 
 
-def draw(scene: Scene) -> bytes:
-    """Return the picture of a scene as PNG."""
+def _sheet(scene: Scene) -> Sheet:
     sheet = Sheet(scene)
     for panel, box in zip(scene.panels, sheet.boxes, strict=True):
         width, height = box[2] - box[0], box[3] - box[1]
         pixels, pixels_per_metre = paint(panel, (width, height))
         sheet.place(panel, box, pixels, pixels_per_metre)
+    return sheet
+
+
+def draw(scene: Scene) -> bytes:
+    """Return the picture of a scene as PNG."""
     stream = io.BytesIO()
-    sheet.image.save(stream, format="PNG", optimize=False)
+    _sheet(scene).image.save(stream, format="PNG", optimize=False)
+    return stream.getvalue()
+
+
+def draw_film(film: Film) -> bytes:
+    """Return the pictures of a film as an animated GIF that never ends."""
+    images = [_sheet(scene).image for scene in film.scenes]
+    # One table of colours for all, or the still parts of the picture would flicker.
+    table = images[0].quantize(255, dither=Image.Dither.NONE)
+    drawn = [image.quantize(palette=table, dither=Image.Dither.NONE) for image in images]
+    frames = [drawn[k] for k in film.order]
+    stream = io.BytesIO()
+    # GIF counts in hundredths of a second.
+    each = 10 * max(2, round(100.0 * film.seconds / len(frames)))
+    frames[0].save(
+        stream, format="GIF", save_all=True, append_images=frames[1:], duration=each, loop=0
+    )
     return stream.getvalue()
 
 
@@ -133,16 +154,16 @@ def _warm_up() -> None:
 
 
 def main() -> None:
-    """Read a scene, write a picture."""
+    """Read a scene or a film, write a picture."""
     # Libraries that print must not spoil the picture: they get standard error.
     output = os.dup(1)
     os.dup2(2, 1)
     _warm_up()
-    scene = pickle.loads(sys.stdin.buffer.read())
-    if not isinstance(scene, Scene):
-        raise TypeError("standard input is not a scene")
+    wanted = pickle.loads(sys.stdin.buffer.read())
+    if not isinstance(wanted, Scene | Film):
+        raise TypeError("standard input is neither a scene nor a film")
     with os.fdopen(output, "wb") as stream:
-        stream.write(draw(scene))
+        stream.write(draw_film(wanted) if isinstance(wanted, Film) else draw(wanted))
 
 
 if __name__ == "__main__":

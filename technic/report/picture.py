@@ -39,7 +39,7 @@ from technic.rigidity.result import RigidityReport, Verdict
 from technic.rigidity.serialize import unit_load
 from technic.units import MM
 
-__all__ = ["part_scene", "report_scene"]
+__all__ = ["headline", "model_layers", "outline", "part_scene", "report_scene"]
 
 OUTLINE: RGB = (0.55, 0.57, 0.60)
 SPOT_COLOR: RGB = (0.80, 0.07, 0.18)
@@ -116,7 +116,8 @@ def _spot_markers(report: RigidityReport, points: tuple[Array, ...]) -> tuple[Ma
     return tuple(markers)
 
 
-def _title(report: RigidityReport) -> tuple[str, str]:
+def headline(report: RigidityReport) -> tuple[str, str]:
+    """Return title and subtitle of a picture: verdict and rigidity, then mass and compliance."""
     verdict = report.verdict.value.capitalize()
     if report.verdict is not Verdict.RIGID and report.mobility.structural:
         motions = count(report.mobility.structural, "motion")
@@ -230,7 +231,7 @@ def report_scene(
                 "none", NEUTRAL, f"{count(stand_ins, 'part')} without a shape drawn as tubes"
             )
         )
-    title, subtitle = _title(report)
+    title, subtitle = headline(report)
     return Scene(title, subtitle, tuple(panels), tuple(legend))
 
 

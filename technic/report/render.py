@@ -15,7 +15,7 @@ from pathlib import Path
 import technic
 from technic.errors import MissingDependency
 from technic.report.files import write_bytes
-from technic.report.scene import Scene
+from technic.report.scene import Film, Scene
 
 __all__ = ["Painter"]
 
@@ -64,8 +64,8 @@ class Painter:
         """
         write_bytes(path, self.picture(scene))
 
-    def picture(self, scene: Scene) -> bytes:
-        """Return the picture of one scene as PNG.
+    def picture(self, scene: Scene | Film) -> bytes:
+        """Return the picture of one scene as PNG, or of a film as GIF.
 
         Raises
         ------
@@ -100,15 +100,15 @@ class Painter:
             process.communicate()
 
 
-def _ask(process: subprocess.Popen[bytes], scene: Scene) -> tuple[bytes | None, str]:
-    """Return the PNG, or None and the last line of what the process complained about."""
+def _ask(process: subprocess.Popen[bytes], scene: Scene | Film) -> tuple[bytes | None, str]:
+    """Return the picture, or None and the last line of what the process complained about."""
     try:
         picture, complaint = process.communicate(pickle.dumps(scene), timeout=_TIMEOUT_S)
     except subprocess.TimeoutExpired:
         process.kill()
         process.communicate()
         return None, f"no answer within {_TIMEOUT_S:.0f} s"
-    if process.returncode == 0 and picture.startswith(b"\x89PNG"):
+    if process.returncode == 0 and picture.startswith((b"\x89PNG", b"GIF8")):
         return picture, ""
     lines = complaint.decode(errors="replace").strip().splitlines()
     return None, lines[-1].strip() if lines else f"exit code {process.returncode}"

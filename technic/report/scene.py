@@ -9,7 +9,18 @@ from numpy.typing import NDArray
 
 from technic.geometry import Array
 
-__all__ = ["RGB", "Camera", "LegendItem", "Lines", "Marker", "Panel", "Scene", "Surface", "merge"]
+__all__ = [
+    "RGB",
+    "Camera",
+    "Film",
+    "LegendItem",
+    "Lines",
+    "Marker",
+    "Panel",
+    "Scene",
+    "Surface",
+    "merge",
+]
 
 Faces = NDArray[np.int64]
 RGB = tuple[float, float, float]
@@ -125,6 +136,25 @@ class Scene:
     panels: tuple[Panel, ...]
     legend: tuple[LegendItem, ...]
     size: tuple[int, int] = (1600, 1200)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Film:
+    """Pictures of one size, shown one after the other and again from the start.
+
+    Parameters
+    ----------
+    scenes : tuple of Scene
+        Each drawn once.
+    order : tuple of int
+        Which scene is shown when; a swing shows most of them twice.
+    seconds : float
+        That one round takes.
+    """
+
+    scenes: tuple[Scene, ...]
+    order: tuple[int, ...]
+    seconds: float
 
 
 def merge(surfaces: list[Surface], *, opacity: float = 1.0, on_top: bool = False) -> Surface:

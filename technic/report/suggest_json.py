@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any
 
-from technic.design.suggest import Suggestion, Suggestions, needs
+from technic.design.filters import needs
+from technic.design.suggest import Suggestion, Suggestions
 from technic.ldraw.write import NewPart
 from technic.parts.catalogue import catalogue
 from technic.report.palette import color_name
@@ -97,6 +98,9 @@ def _suggestion(before: RigidityReport, suggestion: Suggestion, rank: int) -> di
         "needs": dict(needs(candidate)),
         "cures": cure_words(before, suggestion),
         "predicted_n_per_m": forecast if isfinite(forecast) else None,
+        "refined_n_per_m": suggestion.refined.rigidity
+        if isfinite(suggestion.refined.rigidity)
+        else None,
         "predicted_motions_removed": suggestion.forecast.removed,
         "reanalyzed_n_per_m": None if after.rigidity is None else after.rigidity.value,
         "interval_95": None
@@ -104,4 +108,12 @@ def _suggestion(before: RigidityReport, suggestion: Suggestion, rank: int) -> di
         else list(after.rigidity.interval_95),
         "factor": suggestion.factor,
         "after": _state(after),
+        "twins": suggestion.twins,
+        "pair": None
+        if suggestion.pair is None
+        else {
+            "new_parts": [_new_part(part) for part in suggestion.pair.change.added],
+            "removed_parts": list(suggestion.pair.change.removed),
+            "after": _state(suggestion.pair.report),
+        },
     }

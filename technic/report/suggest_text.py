@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 from technic.assembly.model import Assembly
 from technic.design.candidates import Attachment, describe_fit
-from technic.design.suggest import Suggestion, Suggestions, needs
+from technic.design.filters import needs
+from technic.design.suggest import Suggestion, Suggestions
 from technic.parts.catalogue import catalogue
 from technic.report.style import Style
 from technic.report.wording import count, joined, number, part_name, place, spot_words

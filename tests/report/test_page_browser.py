@@ -217,7 +217,7 @@ def test_parts_can_be_hidden_and_shown(visit, chassis: RigidityReport) -> None:
 
 
 def test_energy_colours_have_a_labelled_legend(visit, chassis: RigidityReport) -> None:
-    from technic.report.html.energy import energy_shares
+    from technic.report.energy import energy_shares
 
     seen = visit(chassis)
     own = seen.canvas()

@@ -7,16 +7,8 @@ export const ROW = 1024;
 export const FIXED = 6;
 export const MOVED = 17;
 
-/** Colours of strain energy from none to the most, as red, green, blue from 0 to 1. */
-export const RAMP = [
-  [0.87, 0.89, 0.91],
-  [0.99, 0.83, 0.4],
-  [0.95, 0.47, 0.16],
-  [0.72, 0.07, 0.16],
-  [0.3, 0.0, 0.25],
-];
-
-const ramp = RAMP.map((stop) => `vec3(${stop.map((v) => v.toFixed(3)).join(", ")})`).join(", ");
+/** Stops of the colour scale of strain energy; the page brings the colours. */
+export const STOPS = 5;
 
 const MOVEMENT = `
 precision highp float;
@@ -80,15 +72,15 @@ vec3 placed(int i, vec3 local) {
 export const PART_VERTEX = `${MOVEMENT}
 uniform bool uByEnergy, uFade;
 uniform float uMost;
+uniform vec3 uRamp[${STOPS}];
 uniform vec3 uPaper;
 out vec3 vView;
 flat out vec3 vColor;
 
 vec3 heat(float share) {
-  vec3 stops[${RAMP.length}] = vec3[${RAMP.length}](${ramp});
-  float at = clamp(share, 0.0, 1.0) * float(${RAMP.length - 1});
-  int low = min(int(floor(at)), ${RAMP.length - 2});
-  return mix(stops[low], stops[low + 1], at - float(low));
+  float at = clamp(share, 0.0, 1.0) * float(${STOPS - 1});
+  int low = min(int(floor(at)), ${STOPS - 2});
+  return mix(uRamp[low], uRamp[low + 1], at - float(low));
 }
 
 void main() {

@@ -95,6 +95,7 @@ export class Stage {
       uByEnergy: { value: false },
       uFade: { value: false },
       uMost: { value: this.most },
+      uRamp: { value: contents.ramp.map((stop) => new Vector3(...stop)) },
       uPaper: { value: new Vector3(1, 1, 1) },
     };
     this.edges = [];

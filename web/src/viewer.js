@@ -4,7 +4,6 @@ import { Vector3 } from "three";
 import { PartList } from "./list.js";
 import { Marks } from "./marks.js";
 import { Orbit } from "./orbit.js";
-import { RAMP } from "./shaders.js";
 import { Stage } from "./stage.js";
 
 const PERIOD = 2.4; // seconds for one swing to and fro
@@ -299,9 +298,10 @@ export class Viewer {
     const canvas = byId("ramp");
     const ink = canvas.getContext("2d");
     const gradient = ink.createLinearGradient(0, 0, canvas.width, 0);
-    RAMP.forEach((stop, k) => {
+    const stops = this.model.contents.ramp;
+    stops.forEach((stop, k) => {
       const color = stop.map((value) => Math.round(255 * value)).join(",");
-      gradient.addColorStop(k / (RAMP.length - 1), `rgb(${color})`);
+      gradient.addColorStop(k / (stops.length - 1), `rgb(${color})`);
     });
     ink.fillStyle = gradient;
     ink.fillRect(0, 0, canvas.width, canvas.height);

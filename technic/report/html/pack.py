@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from technic.geometry import Array
 from technic.report.camera import view_direction
 from technic.report.drawing import Drawing
-from technic.report.html.energy import energy_shares
+from technic.report.energy import energy_shares
+from technic.report.heat import RAMP
 from technic.report.html.fields import Field, mode_fields, motion_fields
 from technic.report.html.shapes import Shapes, shapes_of
 from technic.report.load_arrows import ARROW_RADIUS, ARROW_SHARE, load_samples
@@ -215,6 +216,7 @@ def pack(report: RigidityReport, drawing: Drawing, spots: int) -> tuple[dict[str
         "half": [float(v) for v in 0.5 * (high - low) / MM],
         "extremes": _extremes(everything - middle),
         "light": shapes.light,
+        "ramp": [list(stop) for stop in RAMP],
         "toward": [float(v) for v in toward],
         "rotations": block.add(rotations, "float32"),
         "translations": block.add((translations - middle) / MM, "float32"),
