@@ -16,6 +16,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, Final, TypeGuard
 
+import numpy as np
+
 from technic.assembly.joint_types import HELD, JointType
 from technic.errors import InputError, SchemaError, UsageError
 from technic.geometry import Array, readonly
@@ -35,6 +37,9 @@ SCHEMA: Final = "technic-stiffness/1"
 
 MOTIONS: Final = ("axial", "shear", "spin", "tilt")
 """Names of the values of a connection: N/m for the first two, N m/rad for the others."""
+
+_NORMAL_95: Final = 1.959964
+"""Half width of a 95 % interval in standard deviations."""
 
 SLOTS: Final = {"axial": (0,), "shear": (1, 2), "spin": (3,), "tilt": (4, 5)}
 
@@ -117,11 +122,17 @@ class StiffnessTable:
     connections : mapping of str to ConnectionStiffness
     sources : mapping of str to str
         What each provenance means.
+    measured : tuple of (str, str)
+        Connection and motion of every value with a known uncertainty.
+    log_covariance : (k, k) ndarray
+        Covariance of the natural logarithms of these values.
     """
 
     name: str
     connections: Mapping[str, ConnectionStiffness]
     sources: Mapping[str, str] = field(default_factory=dict)
+    measured: tuple[tuple[str, str], ...] = ()
+    log_covariance: Array = field(default_factory=lambda: readonly(np.zeros((0, 0))), compare=False)
 
     def get(self, connection: str) -> ConnectionStiffness:
         """Return the entry of a connection.
@@ -171,6 +182,8 @@ def read_table(path: str | Path) -> StiffnessTable:
         table.name,
         {**base.connections, **table.connections},
         {**base.sources, **table.sources},
+        table.measured,
+        table.log_covariance,
     )
 
 
@@ -188,10 +201,61 @@ def parse_table(data: Mapping[str, Any], path: str | Path) -> StiffnessTable:
         faults.append("connection: expected at least one table")
         raw = {}
     connections = {key: _connection(key, entry, faults) for key, entry in raw.items()}
+    found = {k: v for k, v in connections.items() if v is not None}
+    measured, covariance = _covariance(data.get("calibration", {}), found, faults)
     if faults:
         raise SchemaError(faults, path=path)
     name = str(data.get("name", Path(path).stem))
-    return StiffnessTable(name, {k: v for k, v in connections.items() if v is not None}, sources)
+    return StiffnessTable(name, found, sources, measured, covariance)
+
+
+def _covariance(
+    section: Any, connections: Mapping[str, ConnectionStiffness], faults: list[str]
+) -> tuple[tuple[tuple[str, str], ...], Array]:
+    """Return the values of known uncertainty and the covariance of their logarithms.
+
+    The section ``[calibration]`` gives it; values that have only an interval stand for themselves.
+    """
+    intervals = {
+        (name, motion): value.interval_95
+        for name, entry in connections.items()
+        for motion, value in entry.values.items()
+        if value.interval_95 is not None and value.interval_95[0] > 0.0
+    }
+    given = section.get("parameters", []) if isinstance(section, dict) else None
+    if not isinstance(given, list) or not all(isinstance(x, str) and " " in x for x in given):
+        faults.append('calibration.parameters: expected names like "pin/pin_hole shear"')
+        return (), readonly(np.zeros((0, 0)))
+    listed = [(x.rpartition(" ")[0], x.rpartition(" ")[2]) for x in given]
+    for name in listed:
+        if name[0] not in connections or name[1] not in connections[name[0]].values:
+            faults.append(f"calibration.parameters: the table has no {name[1]} of {name[0]}")
+    try:
+        matrix = np.array(section.get("log_covariance", []), dtype=float)
+    except (TypeError, ValueError):
+        matrix = np.full((1, 1), np.nan)
+    count = len(listed)
+    matrix = matrix.reshape(0, 0) if matrix.size == 0 else matrix
+    good = matrix.shape == (count, count) and bool(np.isfinite(matrix).all())
+    if not good or not np.allclose(matrix, matrix.T) or (count and _lowest(matrix) < 0.0):
+        faults.append(
+            f"calibration.log_covariance: expected {count} rows of {count} numbers, symmetric "
+            "and positive semi-definite"
+        )
+        return (), readonly(np.zeros((0, 0)))
+    alone = [name for name in intervals if name not in listed]
+    out = np.zeros((count + len(alone), count + len(alone)))
+    out[:count, :count] = matrix
+    for k, name in enumerate(alone, count):
+        low, high = intervals[name]
+        out[k, k] = (np.log(high / low) / (2.0 * _NORMAL_95)) ** 2
+    return (*listed, *alone), readonly(out)
+
+
+def _lowest(matrix: Array) -> float:
+    """Return the smallest eigenvalue, rounding set to 0."""
+    values = np.linalg.eigvalsh(matrix)
+    return float(values[0]) if values[0] < -1e-9 * abs(values[-1]) else 0.0
 
 
 def _connection(key: str, entry: Any, faults: list[str]) -> ConnectionStiffness | None:

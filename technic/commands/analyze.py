@@ -86,12 +86,17 @@ def run(model: Path, options: AnalysisOptions) -> None:
     _check_targets(options)
     with Outputs(options) as outputs:
         more = ModelOptions(options.library, options.no_library, options.shadow, options.gears)
-        assembly = load(model, **reading(model, options.axle_slide, options.calibration, more))
+        how = reading(model, options.axle_slide, options.calibration, more)
+        assembly = load(model, **how)
         if options.fix:
             supports = tuple(parse_fix(assembly, text) for text in options.fix)
             assembly = replace(assembly, supports=assembly.supports + supports)
         report = analyze_assembly(
-            assembly, measure=options.measure, modes=options.modes, parts=options.parts
+            assembly,
+            measure=options.measure,
+            modes=options.modes,
+            parts=options.parts,
+            table=how.get("table"),
         )
         if options.json is not None:
             write_json(report.to_dict(), options.json)

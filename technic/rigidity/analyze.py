@@ -12,6 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from technic.assembly.model import Assembly, FindingKind
+from technic.assembly.stiffness import StiffnessTable
 from technic.geometry import Array
 from technic.rigidity.eigen import elastic_modes
 from technic.rigidity.exact import lattice_rows, modular_rank
@@ -32,6 +33,7 @@ from technic.rigidity.result import (
     Verdict,
 )
 from technic.rigidity.sentences import motion_sentence, not_modelled, reason
+from technic.rigidity.uncertainty import rigidity_interval
 from technic.rigidity.worst_case import mode_of, node_fields, rigid_parts, weak_spots
 from technic.system.assemble import ElementFactory, System, assemble, element_of, rigid_element_of
 from technic.tolerances import MAIN_COMPONENT_SHARE, MOBILITY_GAP
@@ -60,6 +62,7 @@ def analyze(
     measure: Measure = "mean_square",
     modes: int = 6,
     parts: PartModel = "frame",
+    table: StiffnessTable | None = None,
 ) -> RigidityReport:
     """Tell how rigid an assembly is.
 
@@ -73,6 +76,9 @@ def analyze(
         Elastic modes of the heaviest component.
     parts : {"frame", "rigid"}
         What parts are made of.
+    table : StiffnessTable, optional
+        Where the joints' stiffnesses came from; when some of them were measured, the rigidity gets a
+        95 % interval.
 
     Returns
     -------
@@ -94,6 +100,8 @@ def analyze(
             _elastic(system, kin, body.motions, measure, modes if c == 0 else 1, shown=c == 0)
             for c, body in enumerate(bodies)
         ]
+    if found:
+        found[0] = (_with_interval(system, *found[0], table), found[0][1])
     with _timed(timings, "weak_spots"):
         main_modes = found[0][1] if found else ()
         first = main_modes[0].unknowns if main_modes else None
@@ -209,6 +217,18 @@ def _elastic(
         unknowns[own] = pairs.vectors[:, k]
         out.append(mode_of(system, inertia, float(pairs.values[k]), unknowns, measure))
     return rigidity, tuple(out)
+
+
+def _with_interval(
+    system: System,
+    rigidity: Rigidity | None,
+    modes: tuple[Mode, ...],
+    table: StiffnessTable | None,
+) -> Rigidity | None:
+    if rigidity is None or table is None or not modes:
+        return rigidity
+    interval = rigidity_interval(system, modes[0].unknowns, rigidity.value, table)
+    return replace(rigidity, interval_95=interval)
 
 
 def _verdict(assembly: Assembly, kin: Kinematics, bodies: list[_Body]) -> Verdict:

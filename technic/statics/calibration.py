@@ -24,8 +24,9 @@ from technic.errors import InputError, SchemaError
 from technic.geometry import Array
 from technic.loading import load
 from technic.statics.loads import parse_probe
-from technic.statics.rig import Parameter, RigModel, rig_model
+from technic.statics.rig import RigModel, rig_model
 from technic.system.assemble import ElementFactory, element_of
+from technic.system.parameters import Parameter
 
 __all__ = ["Calibration", "Measured", "calibrate", "forward_model"]
 

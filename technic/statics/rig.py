@@ -18,24 +18,14 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 
 from technic.assembly.model import Assembly
-from technic.assembly.stiffness import SLOTS, StiffnessTable
+from technic.assembly.stiffness import StiffnessTable
 from technic.errors import UsageError
 from technic.geometry import Array
 from technic.statics.solve import free_motions, refuse_driven
 from technic.system.assemble import ElementFactory, Probe, System, assemble, element_of
+from technic.system.parameters import Parameter, parameter_rows
 
-__all__ = ["Parameter", "RigModel", "parameter_rows", "rig_model"]
-
-
-@dataclass(frozen=True, slots=True, order=True)
-class Parameter:
-    """A stiffness that can be measured: the motion of a connection, e.g. shear of pin/pin_hole."""
-
-    connection: str
-    motion: str
-
-    def __str__(self) -> str:
-        return f"{self.motion} of {self.connection}"
+__all__ = ["RigModel", "rig_model"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,21 +76,6 @@ class RigModel:
         slope = np.zeros((len(self.parameters), 3, 6))
         np.add.at(slope, self.owner, -energy)
         return value, slope
-
-
-def parameter_rows(
-    system: System, parameters: Sequence[Parameter]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the rows of ``A`` that a parameter decides, and which one, each (r,)."""
-    index = {(p.connection, slot): k for k, p in enumerate(parameters) for slot in SLOTS[p.motion]}
-    joints = system.assembly.joints
-    found = [
-        (row, index[joints[link].connection, int(motion)])
-        for row, (link, motion) in enumerate(zip(system.rows.link, system.rows.motion, strict=True))
-        if link < len(joints) and (joints[link].connection, int(motion)) in index
-    ]
-    chosen = np.array(found, dtype=np.int64).reshape(-1, 2)
-    return chosen[:, 0], chosen[:, 1]
 
 
 def rig_model(

@@ -10,7 +10,7 @@ from calibration.dataset import GRAVITY
 from calibration.rigs import Condition, shipped_rigs
 from technic.assembly.stiffness import default_table
 from technic.statics.calibration import forward_model
-from technic.statics.rig import Parameter
+from technic.system.parameters import Parameter
 
 SHEAR, TILT = 65625.0, 0.240
 """The values of Liu et al. 2022, in our units."""
