@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from technic.errors import InputError, SchemaError
 from technic.parts.definition import FrameBody, RigidBody, TrussBody
 
 SQUARE = {"kind": "rectangle", "width": 0.004, "height": 0.006}
-GOOD = {
+GOOD: dict[str, Any] = {
     "schema": "technic-assembly/1",
     "dimension": 3,
     "materials": {"steel": {"young_pa": 2e11, "poisson": 0.3, "density": 7800}},
@@ -41,7 +42,7 @@ GOOD = {
 def changed(path, value):
     """Return the good file with one value replaced; `path` is a list of keys."""
     data = copy.deepcopy(GOOD)
-    inner = data
+    inner: Any = data
     for key in path[:-1]:
         inner = inner[key]
     if value is None:
@@ -61,7 +62,9 @@ def test_a_file_becomes_an_assembly(tmp_path):
     assert [type(p.body) for p in model.parts] == [FrameBody, RigidBody, TrussBody]
     bar = model.parts[0]
     assert bar.mass_properties.mass == pytest.approx(7800 * 0.004 * 0.006 * 0.1)
+    assert isinstance(bar.body, FrameBody)
     assert bar.body.material.young_pa == 2e11
+    assert isinstance(model.parts[2].body, TrussBody)
     assert model.parts[2].body.material.name == "ABS"
     hinge = model.joints[0]
     np.testing.assert_allclose(hinge.axes[0], [0, 0, 1])
@@ -71,7 +74,9 @@ def test_a_file_becomes_an_assembly(tmp_path):
 
 
 def test_a_bar_has_the_section_of_the_textbook():
-    section = build_assembly(GOOD).parts[0].body.sections[0]
+    body = build_assembly(GOOD).parts[0].body
+    assert isinstance(body, FrameBody)
+    section = body.sections[0]
     assert section.area == pytest.approx(24e-6)
     assert section.inertia_z == pytest.approx(0.004 * 0.006**3 / 12)  # bends in the plane of height
     assert section.inertia_y == pytest.approx(0.006 * 0.004**3 / 12)

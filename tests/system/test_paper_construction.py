@@ -46,6 +46,7 @@ def add(linkage, name, kind, at, cube):
     """Add a part of a kind that has the joint's point on it or near it."""
     shift = 0.03 if name == "a" else -0.05
     p: Any
+    q: Any
     if len(at) == 2:
         p, q = at, (at[0] + shift, at[1] + 0.07)
         corners = [p, q, (at[0] + shift, at[1] - 0.04)]
