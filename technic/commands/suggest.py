@@ -11,12 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from technic.commands.options import AxleSlideOption, JsonOption, QuietOption
+from technic.commands.options import AxleSlideOption, CalibrationOption, JsonOption, QuietOption
+from technic.commands.reading import reading
 from technic.errors import UsageError
 
 if TYPE_CHECKING:
     from technic.assembly.model import Assembly
-    from technic.design.suggest import Filters, Suggestion, Suggestions
+    from technic.design.apply import Change
+    from technic.design.filters import Filters
+    from technic.design.suggest import Suggestion, Suggestions
 
 __all__ = ["suggest"]
 
@@ -37,7 +40,7 @@ class _Wishes:
 
 def _filters(assembly: Assembly, wishes: _Wishes) -> Filters:
     from technic.assembly.select import find_part
-    from technic.design.suggest import Filters
+    from technic.design.filters import Filters
     from technic.report.parts_list import read_inventory
     from technic.units import LDU, MM
 
@@ -91,6 +94,16 @@ def _taken(answers: Sequence[Suggestions], rank: int, *, sequence: bool) -> list
     if not 1 <= rank <= len(every):
         raise UsageError(f"there is no suggestion {rank}; there are {len(every)}")
     return every[:rank] if sequence else [every[rank - 1]]
+
+
+def _changes(chosen: Sequence[Suggestion], *, pair: bool) -> list[Change]:
+    """Return what to write, twins included when they are asked for."""
+    changes = [suggestion.change for suggestion in chosen]
+    if pair:
+        if len(chosen) != 1 or chosen[0].pair is None:
+            raise UsageError("--pair needs a suggestion that has a twin to be built beside it")
+        changes.append(chosen[0].pair.change)
+    return changes
 
 
 def suggest(
@@ -168,12 +181,17 @@ def suggest(
     color: Annotated[
         int, typer.Option("--color", min=0, metavar="CODE", help="LDraw colour of new parts.")
     ] = 25,
+    pair: Annotated[
+        bool, typer.Option("--pair", help="With --apply: write it and its twin on the other side.")
+    ] = False,
     axle_slide: AxleSlideOption = "held",
+    calibration: CalibrationOption = None,
     quiet: QuietOption = False,
 ) -> None:
     """Say which real beam makes a model more rigid, and write the model with it."""
     from technic.design.apply import write_reinforced
-    from technic.design.suggest import needs, reinforce
+    from technic.design.filters import needs
+    from technic.design.reinforce import reinforce
     from technic.design.suggest import suggest as find
     from technic.loading import load
     from technic.report.files import check_writable
@@ -187,7 +205,9 @@ def suggest(
             check_writable(path)
     if model.suffix.lower() == ".json":
         raise UsageError("suggestions are made of LEGO parts: give an LDraw model (.ldr, .mpd)")
-    assembly = load(model, axle_slide=axle_slide)
+    options = reading(model, axle_slide, calibration)
+    assembly = load(model, **options)
+    joining = {key: options[key] for key in ("axle_slide", "table") if key in options}
     wishes = _Wishes(
         between, box, lengths, straight, snug, inventory, max_parts, tuple(keep_out or ())
     )
@@ -202,7 +222,7 @@ def suggest(
             shortlist=shortlist,
             rank=rank,
             color=color,
-            axle_slide=axle_slide,
+            **joining,
             progress=_progress,
         )
     else:
@@ -214,7 +234,7 @@ def suggest(
                 rank=rank,
                 filters=filters,
                 color=color,
-                axle_slide=axle_slide,
+                **joining,
                 progress=_progress,
             )
         ]
@@ -232,7 +252,7 @@ def suggest(
         sys.stdout.write(text)
         sys.stdout.flush()
     if out is not None:
-        write_reinforced(model, out, assembly, [s.change for s in chosen])
+        write_reinforced(model, out, assembly, _changes(chosen, pair=pair))
     if parts_list is not None:
         every = [s for a in answers for s in (a.suggestions if sequence else a.suggestions[:1])]
         total: Counter[str] = Counter()

@@ -135,6 +135,7 @@ def candidates(
     bent: bool = True,
     snug: float = 0.0,
     exclude: frozenset[int] = frozenset(),
+    stock: frozenset[str] | None = None,
 ) -> list[Candidate]:
     """Return every place for a beam, without regard to what else is in its way.
 
@@ -149,6 +150,8 @@ def candidates(
         Largest mismatch of holes (m); at most `EXACT` when 0.
     exclude : frozenset of int
         Parts that nothing may be tied to.
+    stock : frozenset of str, optional
+        Only these beams; a longer one may then stand in for one that is missing.
     """
     lengths = sorted(lengths or STRAIGHT)
     unknown = [n for n in lengths if n not in STRAIGHT]
@@ -157,12 +160,14 @@ def candidates(
             f"there is no straight beam with {unknown[0]} holes; there are "
             + ", ".join(map(str, STRAIGHT))
         )
+    curved: tuple[str, ...] = BENT if bent else ()
+    if stock is not None:
+        lengths = [n for n in lengths if STRAIGHT[n] in stock]
+        curved = tuple(number for number in curved if number in stock)
     found: list[Candidate] = []
     for bundle in bundles(assembly, exclude=exclude):
         for layer in _layers(bundle):
-            found += _layer_candidates(
-                bundle, layer, lengths, BENT if bent else (), max(snug, EXACT)
-            )
+            found += _layer_candidates(bundle, layer, lengths, curved, max(snug, EXACT))
     return found
 
 

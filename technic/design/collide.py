@@ -18,12 +18,14 @@ import numpy as np
 import trimesh
 
 from technic.assembly.model import Assembly, Part
+from technic.errors import UsageError
 from technic.geometry import Array, Pose, axes_from
-from technic.parts.definition import PartDefinition
+from technic.parts.catalogue import catalogue
+from technic.parts.definition import PartDefinition, PortKind
 from technic.parts.shapes import has_shape, mesh
-from technic.units import LDU, PITCH
+from technic.units import LDU
 
-__all__ = ["PLAY", "Surroundings", "overlap", "push_side", "solid_overlaps"]
+__all__ = ["PLAY", "Surroundings", "overlap", "pin_length", "push_side", "solid_overlaps"]
 
 PLAY: Final = 0.1e-3
 """New parts are tested this much smaller on every face (m): LEGO beams are 7.8 mm wide in a grid of 8
@@ -220,8 +222,12 @@ def _matrix(pose: Pose) -> Array:
     return np.column_stack([pose.rotation, pose.translation / LDU])
 
 
-LENGTH: Final = {"2780": 2 * PITCH, "6558": 3 * PITCH, "32556a": 3 * PITCH}
-"""Length of the new pins (m)."""
+def pin_length(number: str) -> float:
+    """Return the length of a pin (m)."""
+    definition = catalogue().get(number)
+    if definition is None:
+        raise UsageError(f"part {number} is not in the catalogue")
+    return sum(p.length for p in definition.ports if p.kind is PortKind.PIN)
 
 
 def solid_overlaps(

@@ -1,40 +1,33 @@
 """Which real part makes a model more rigid: find places, forecast, check what is in the way, prove.
 
-The forecast puts all candidates in order; from the top of that order those that can be built are
-re-analysed exactly, joints found anew as if the written model were read again.
+The forecast puts all candidates in order; from the top of that order those that can be built get a
+refined forecast; the best of these are re-analysed exactly, joints found anew as if the written model
+were read again.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 import numpy as np
 
 from technic.assembly.model import Assembly, Joint, Part
+from technic.assembly.stiffness import StiffnessTable
 from technic.design.apply import HIGHLIGHT, Change, change_of, extend
 from technic.design.candidates import Candidate, candidates
-from technic.design.collide import LENGTH, Surroundings, push_side
+from technic.design.collide import Surroundings
+from technic.design.filters import Filters, allowed
+from technic.design.fit import fit, still_apart
 from technic.design.screen import Forecast, Screen
 from technic.errors import UsageError
-from technic.geometry import Array
 from technic.ldraw.connect import AxleSlide
-from technic.parts.catalogue import catalogue
 from technic.rigidity.analyze import analyze
 from technic.rigidity.result import MotionKind, RigidityReport, WeakSpot
-from technic.units import LDU
 
-__all__ = [
-    "Filters",
-    "Rank",
-    "Suggestion",
-    "Suggestions",
-    "needs",
-    "reinforce",
-    "suggest",
-]
+__all__ = ["Pair", "Progress", "Rank", "Suggestion", "Suggestions", "merit", "suggest"]
 
 Rank = Literal["ritz", "paper"]
 
@@ -44,42 +37,31 @@ SHORTLIST: Final = 50
 _RESISTED: Final = 1e-3
 """A motion is stopped when the beam resists it at least this much beside the one it resists most."""
 
+_TWIN: Final = 5e-3
+"""Candidates of one part number whose refined forecasts differ by less than this share are twins:
+mirror images of each other in a model that is not quite symmetric."""
+
 Progress = Callable[[str, int, int], None]
 """Told the stage, how much of it is done, and how much there is."""
 
 
-@dataclass(frozen=True, slots=True)
-class Filters:
-    """What may be suggested.
+@dataclass(frozen=True, slots=True, eq=False)
+class Pair:
+    """A suggestion together with its twin, the same part where it helps as much.
 
     Parameters
     ----------
-    between : (int, int) or None
-        Parts that the new beam must tie together.
-    box : (2, 3) sequence or None
-        Opposite corners of the space that the beam must stay in (m).
-    lengths : tuple of int or None
-        Lengths of straight beams.
-    bent : bool
-        Offer bent beams.
-    snug : float
-        Largest mismatch of holes (m).
-    inventory : mapping of str to int or None
-        How many of each part there are; parts that it does not name are not there.
-    max_parts : int or None
-        Most new parts of one suggestion, pins included.
-    keep_out : frozenset of int
-        Parts that nothing may be tied to (wheels, steering).
+    candidate : Candidate
+        The twin.
+    change : Change
+        Of the twin alone.
+    report : RigidityReport
+        Of the model with both.
     """
 
-    between: tuple[int, int] | None = None
-    box: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
-    lengths: tuple[int, ...] | None = None
-    bent: bool = True
-    snug: float = 0.0
-    inventory: Mapping[str, int] | None = None
-    max_parts: int | None = None
-    keep_out: frozenset[int] = frozenset()
+    candidate: Candidate
+    change: Change
+    report: RigidityReport
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,6 +75,7 @@ class Suggestion:
         Its parts are indices into the assembly that was asked about.
     change : Change
     forecast : Forecast
+    refined : Forecast
     report : RigidityReport
         Of the reinforced model.
     factor : float or None
@@ -105,17 +88,24 @@ class Suggestion:
         that it keeps; None when motions are stopped.
     sides : tuple of str
         For each new pin, from where it can be pushed in.
+    twins : int
+        How many other places take the same part and help as much.
+    pair : Pair or None
+        With the first twin that can be built beside it.
     """
 
     rank: int
     candidate: Candidate
     change: Change
     forecast: Forecast
+    refined: Forecast
     report: RigidityReport
     factor: float | None
     stops: tuple[int, ...]
     relieves: tuple[WeakSpot, float] | None
     sides: tuple[str, ...]
+    twins: int = 0
+    pair: Pair | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,15 +129,29 @@ class Suggestions:
     refused: Counter[str] = field(default_factory=Counter)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Place:
+    """A candidate that can be built, on its way to the proof, and its twins."""
+
+    candidate: Candidate
+    change: Change
+    forecast: Forecast
+    refined: Forecast
+    sides: tuple[str, ...]
+    twins: tuple[_Place, ...] = ()
+
+
 def suggest(
     assembly: Assembly,
     *,
-    count: int = 10,
+    count: int = 5,
     shortlist: int = SHORTLIST,
     rank: Rank = "ritz",
     filters: Filters | None = None,
+    pairs: bool = True,
     color: int = HIGHLIGHT,
     axle_slide: AxleSlide = "held",
+    table: StiffnessTable | None = None,
     before: RigidityReport | None = None,
     progress: Progress | None = None,
 ) -> Suggestions:
@@ -165,9 +169,13 @@ def suggest(
     rank : {"ritz", "paper"}
         How candidates are put in order before: by Rayleigh-Ritz, or by the paper's projection.
     filters : Filters, optional
+    pairs : bool
+        Offer a suggestion and its twin together as well.
     color : int
         LDraw colour of new parts.
     axle_slide : {"held", "free"}
+        As the model was read.
+    table : StiffnessTable, optional
         As the model was read.
     before : RigidityReport, optional
         Of the model, when there is one already.
@@ -182,134 +190,50 @@ def suggest(
     filters = filters or Filters()
     tell = progress or _silent
     before = before or analyze(assembly, modes=1)
-    found = _filtered(
-        candidates(
-            assembly,
-            lengths=filters.lengths,
-            bent=filters.bent,
-            snug=filters.snug,
-            exclude=filters.keep_out,
-        ),
-        filters,
+    found = candidates(
+        assembly,
+        lengths=filters.lengths,
+        bent=filters.bent,
+        snug=filters.snug,
+        exclude=filters.keep_out,
+        stock=None if filters.inventory is None else _stock(filters),
     )
+    found = allowed(found, filters)
     refused: Counter[str] = Counter()
     if not found:
         return Suggestions(before, (), 0, refused)
     tell("forecast", 0, len(found))
-    screen = Screen(assembly, found)
+    screen = Screen(assembly, found, table=table)
     forecasts = screen.forecasts(found)
-    order = _order(screen, found, forecasts, rank)
+    tell("forecast", len(found), len(found))
     surroundings = Surroundings(assembly.parts)
     wanted = max(shortlist, count)
-    fitting: list[_Fitting] = []
-    for k in order:
-        if len(fitting) == wanted:
+    places: list[_Place] = []
+    for k in _order(screen, found, forecasts, rank):
+        if len(places) == wanted:
             break
         change = change_of(assembly, found[k], color=color)
-        fit = _fit(surroundings, found[k], change)
-        if isinstance(fit, str):
-            refused[fit] += 1
+        fits = fit(surroundings, found[k], change)
+        if not fits:
+            refused[fits.reason] += 1
             continue
-        tell("check", len(fitting), wanted)
-        fitting.append(_Fitting(found[k], change, forecasts[k], screen.refine(found[k]), fit))
-    fitting.sort(key=lambda f: (-f.refined.removed, -f.refined.rigidity))
+        places.append(_Place(found[k], change, forecasts[k], screen.refine(found[k]), fits.sides))
+        tell("check", len(places), wanted)
     proven: list[Suggestion] = []
-    for place in fitting:
+    for place in _grouped(places):
         if len(proven) == count:
             break
-        tell("prove", len(proven), count)
-        report = analyze(extend(assembly, [place.change], axle_slide=axle_slide), modes=1)
-        why = _harm(before, report)
-        if why:
+        made = extend(assembly, [place.change], axle_slide=axle_slide, table=table)
+        report, why = _prove(before, made, len(place.change.added))
+        if report is None:
             refused[why] += 1
             continue
-        proven.append(
-            Suggestion(
-                rank=0,
-                candidate=place.candidate,
-                change=place.change,
-                forecast=place.forecast,
-                report=report,
-                factor=_factor(before, report),
-                stops=_stops(screen, place.candidate, before, report),
-                relieves=_relieves(before, report),
-                sides=place.sides,
-            )
-        )
-    tell("prove", count, count)
-    proven.sort(key=lambda s: _merit(s.report), reverse=True)
+        pair = _pair(assembly, before, place, axle_slide, table) if pairs else None
+        proven.append(_suggestion(screen, before, place, report, pair))
+        tell("prove", len(proven), count)
+    proven.sort(key=lambda s: merit(s.report), reverse=True)
     best = tuple(replace(s, rank=n) for n, s in enumerate(proven, start=1))
     return Suggestions(before, best, len(found), refused)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Fitting:
-    """A candidate that can be built, on its way to the proof."""
-
-    candidate: Candidate
-    change: Change
-    forecast: Forecast
-    refined: Forecast
-    sides: tuple[str, ...]
-
-
-def reinforce(
-    assembly: Assembly,
-    *,
-    steps: int,
-    target: float | None = None,
-    filters: Filters | None = None,
-    shortlist: int = SHORTLIST,
-    rank: Rank = "ritz",
-    color: int = HIGHLIGHT,
-    axle_slide: AxleSlide = "held",
-    progress: Progress | None = None,
-) -> list[Suggestions]:
-    """Add the best beam again and again, the model analysed anew each time.
-
-    Parameters
-    ----------
-    assembly : Assembly
-    steps : int
-        Most beams to add.
-    target : float, optional
-        Stop when the model is rigid and this stiff (N/m).
-    filters, shortlist, rank, color, axle_slide, progress
-        As for `suggest`; the inventory is used up on the way.
-
-    Returns
-    -------
-    list of Suggestions
-        One for each beam, its first suggestion the one taken; the last has none when nothing more
-        helps.
-    """
-    filters = filters or Filters()
-    before = analyze(assembly, modes=1)
-    current = assembly
-    done: list[Suggestions] = []
-    for _ in range(steps):
-        if target is not None and _reached(before, target):
-            break
-        answer = suggest(
-            current,
-            count=1,
-            shortlist=shortlist,
-            rank=rank,
-            filters=filters,
-            color=color,
-            axle_slide=axle_slide,
-            before=before,
-            progress=progress,
-        )
-        done.append(answer)
-        if not answer.suggestions or _merit(answer.suggestions[0].report) <= _merit(before):
-            done[-1] = replace(answer, suggestions=())
-            break
-        taken = answer.suggestions[0]
-        previous, before = current, taken.report
-        current = taken.report.assembly
-        filters = _used_up(previous, current, filters, taken)
-    return done
 
 
 def _silent(_stage: str, _done: int, _total: int) -> None:
@@ -322,63 +246,11 @@ def _check(assembly: Assembly) -> None:
     ):
         raise UsageError("suggestions are made of LEGO parts: give an LDraw model (.ldr, .mpd)")
     if assembly.supports:
-        raise UsageError("suggestions are made for a free model: leave --fix out")
+        raise UsageError("suggestions are made for a model that nothing holds")
 
 
-def _filtered(found: Sequence[Candidate], filters: Filters) -> list[Candidate]:
-    kept = []
-    for candidate in found:
-        parts = candidate.parts
-        if filters.between is not None and not set(filters.between) <= set(parts):
-            continue
-        if filters.max_parts is not None and 1 + candidate.fasteners > filters.max_parts:
-            continue
-        if filters.inventory is not None and not _in_stock(candidate, filters.inventory):
-            continue
-        if filters.box is not None and not _inside(candidate, filters.box):
-            continue
-        kept.append(candidate)
-    return kept
-
-
-def needs(candidate: Candidate) -> Counter[str]:
-    """Return the new parts of a candidate by number."""
-    need = Counter([candidate.number])
-    need.update(a.fastening.pin for a in candidate.attachments if a.fastening.pin)
-    return need
-
-
-def _in_stock(candidate: Candidate, inventory: Mapping[str, int]) -> bool:
-    return all(inventory.get(number, 0) >= n for number, n in needs(candidate).items())
-
-
-def _inside(candidate: Candidate, box: Sequence[Sequence[float]]) -> bool:
-    low, high = np.minimum(*np.array(box)), np.maximum(*np.array(box))
-    holes = np.array([p.position for p in candidate.definition.ports])
-    world = candidate.pose.points(holes)
-    return bool((world >= low - LDU).all() and (world <= high + LDU).all())
-
-
-def _used_up(start: Assembly, current: Assembly, filters: Filters, taken: Suggestion) -> Filters:
-    """Return the filters for the next step: parts by their index in the changed assembly."""
-    place = {part.id: k for k, part in enumerate(current.parts)}
-    ids = [part.id for part in start.parts]
-    inventory = filters.inventory
-    if inventory is not None:
-        left = Counter(inventory)
-        left.subtract(needs(taken.candidate))
-        left.update(_plain(old) for old in start.parts if old.id in taken.change.removed)
-        inventory = dict(left)
-    between = filters.between
-    if between is not None:
-        between = (place[ids[between[0]]], place[ids[between[1]]])
-    keep_out = frozenset(place[ids[k]] for k in filters.keep_out if ids[k] in place)
-    return replace(filters, inventory=inventory, between=between, keep_out=keep_out)
-
-
-def _plain(part: Part) -> str:
-    """Return the number that the catalogue knows a part by."""
-    return part.number if part.definition is None else part.definition.id
+def _stock(filters: Filters) -> frozenset[str]:
+    return frozenset(number for number, n in (filters.inventory or {}).items() if n > 0)
 
 
 def _order(
@@ -387,51 +259,46 @@ def _order(
     if rank == "paper":
         speeds = screen.projections(found)
         return sorted(range(len(found)), key=lambda k: (-round(speeds[k], 9), k))
+    # rounded, so that rounding does not decide between twins
     return sorted(
         range(len(found)),
-        # rounded, so that rounding does not decide between twins
         key=lambda k: (-forecasts[k].removed, -float(f"{forecasts[k].rigidity:.9g}"), k),
     )
 
 
-def _fit(surroundings: Surroundings, candidate: Candidate, change: Change) -> tuple[str, ...] | str:
-    """Return from where each new pin goes in, or why the candidate cannot be built."""
-    old = {a.fastening.old_pin for a in candidate.attachments} - {-1}
-    hits = surroundings.hits(candidate.definition, change.added[0].pose, old)
-    if hits:
-        return "a part is in the way of the beam"
-    sides = []
-    new_pins = iter(change.added[1:])
-    for attachment in candidate.attachments:
-        fastening = attachment.fastening
-        if fastening.kind == "present":
-            continue
-        pin = next(new_pins)
-        definition = catalogue().get(pin.number)
-        assert definition is not None
-        ignore = {*fastening.parts, *old}
-        if surroundings.hits(definition, pin.pose, ignore):
-            return "a part is in the way of a pin"
-        side = push_side(
-            surroundings, pin.pose.translation, candidate.axis, LENGTH[pin.number], ignore & old
-        )
-        if side == 0:
-            return "a pin cannot be pushed in from either side"
-        sides.append(_side_words(side * candidate.axis))
-    return tuple(sides)
+def _grouped(places: list[_Place]) -> list[_Place]:
+    """Return the places in the order of their refined forecasts, twins under the first of them."""
+    order = sorted(places, key=lambda p: (-p.refined.removed, -float(f"{p.refined.rigidity:.6g}")))
+    groups: list[_Place] = []
+    for place in order:
+        for n, first in enumerate(groups):
+            if _alike(first, place):
+                groups[n] = replace(first, twins=(*first.twins, place))
+                break
+        else:
+            groups.append(place)
+    return groups
 
 
-def _side_words(direction: Array) -> str:
-    axis = int(np.argmax(np.abs(direction).round(9)))
-    return f"{'+' if direction[axis] > 0 else '-'}{'xyz'[axis]}"
-
-
-def _merit(report: RigidityReport) -> tuple[float, float]:
-    """Return what is compared: fewer structural motions first, then the rigidity."""
-    return (
-        -report.mobility.structural,
-        report.rigidity.value if report.rigidity is not None else np.inf,
+def _alike(a: _Place, b: _Place) -> bool:
+    kinds_a, kinds_b = (
+        sorted(x.fastening.kind for x in place.candidate.attachments) for place in (a, b)
     )
+    return (
+        a.candidate.number == b.candidate.number
+        and kinds_a == kinds_b
+        and a.refined.removed == b.refined.removed
+        and abs(a.refined.rigidity - b.refined.rigidity) <= _TWIN * a.refined.rigidity
+    )
+
+
+def _prove(before: RigidityReport, made: Assembly, added: int) -> tuple[RigidityReport | None, str]:
+    """Return the exact analysis of a reinforced model, or None and what is wrong with it."""
+    if not still_apart(made, added):
+        return None, "parts would share space"
+    report = analyze(made, modes=1)
+    why = _harm(before, report)
+    return (None, why) if why else (report, "")
 
 
 def _harm(before: RigidityReport, after: RigidityReport) -> str:
@@ -445,18 +312,57 @@ def _harm(before: RigidityReport, after: RigidityReport) -> str:
     return ""
 
 
+def _pair(
+    assembly: Assembly,
+    before: RigidityReport,
+    place: _Place,
+    axle_slide: AxleSlide,
+    table: StiffnessTable | None,
+) -> Pair | None:
+    """Return a place together with the first twin that can be built beside it."""
+    for twin in place.twins:
+        if set(twin.change.removed) & set(place.change.removed):
+            continue
+        made = extend(assembly, [place.change, twin.change], axle_slide=axle_slide, table=table)
+        report, _ = _prove(before, made, len(place.change.added) + len(twin.change.added))
+        if report is not None:
+            return Pair(twin.candidate, twin.change, report)
+    return None
+
+
+def _suggestion(
+    screen: Screen, before: RigidityReport, place: _Place, report: RigidityReport, pair: Pair | None
+) -> Suggestion:
+    return Suggestion(
+        rank=0,
+        candidate=place.candidate,
+        change=place.change,
+        forecast=place.forecast,
+        refined=place.refined,
+        report=report,
+        factor=_factor(before, report),
+        stops=_stops(screen, place.candidate, before, report),
+        relieves=_relieves(before, report),
+        sides=place.sides,
+        twins=len(place.twins),
+        pair=pair,
+    )
+
+
+def merit(report: RigidityReport) -> tuple[float, float]:
+    """Return what models are compared by: fewer structural motions first, then the rigidity."""
+    return (
+        -float(report.mobility.structural),
+        report.rigidity.value if report.rigidity is not None else np.inf,
+    )
+
+
 def _factor(before: RigidityReport, after: RigidityReport) -> float | None:
     if before.rigidity is None or after.rigidity is None:
         return None
     if before.mobility.structural != after.mobility.structural:
         return None
     return after.rigidity.value / before.rigidity.value
-
-
-def _reached(report: RigidityReport, target: float) -> bool:
-    if report.mobility.structural or report.rigidity is None:
-        return False
-    return report.rigidity.value >= target
 
 
 def _stops(

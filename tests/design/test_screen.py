@@ -8,6 +8,8 @@ from scipy.stats import spearmanr
 
 from technic.design.apply import change_of, extend
 from technic.design.candidates import candidates
+from technic.design.collide import Surroundings
+from technic.design.fit import fit
 from technic.design.screen import Screen
 from technic.ldraw.reader import load_ldraw
 from technic.rigidity.analyze import analyze
@@ -32,7 +34,12 @@ def order(removed, rigidity):
 def test_forecasts_put_candidates_in_the_exact_order(model, name, lengths, bent):
     assembly = load_ldraw(model(name))
     before = analyze(assembly, modes=1)
-    found = candidates(assembly, lengths=lengths, bent=bent)
+    surroundings = Surroundings(assembly.parts)
+    found = [
+        c
+        for c in candidates(assembly, lengths=lengths, bent=bent)
+        if fit(surroundings, c, change_of(assembly, c))
+    ]
     assert len(found) > 30
     screen = Screen(assembly, found)
     forecasts = screen.forecasts(found)

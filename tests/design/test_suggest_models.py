@@ -10,7 +10,9 @@ import pytest
 import technic
 from technic.design.apply import write_reinforced
 from technic.design.collide import solid_overlaps
-from technic.design.suggest import needs, reinforce, suggest
+from technic.design.filters import needs
+from technic.design.reinforce import reinforce
+from technic.design.suggest import suggest
 from technic.ldraw.reader import load_ldraw
 from technic.rigidity.analyze import analyze
 from technic.rigidity.result import Verdict

@@ -1,0 +1,89 @@
+"""Several beams, one after another: each is the best for the model that those before it made."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from technic.assembly.model import Assembly
+from technic.assembly.stiffness import StiffnessTable
+from technic.design.apply import HIGHLIGHT
+from technic.design.filters import Filters, carried_over
+from technic.design.suggest import SHORTLIST, Progress, Rank, Suggestions, merit, suggest
+from technic.ldraw.connect import AxleSlide
+from technic.rigidity.analyze import analyze
+from technic.rigidity.result import RigidityReport
+
+__all__ = ["reinforce"]
+
+
+def reinforce(
+    assembly: Assembly,
+    *,
+    steps: int,
+    target: float | None = None,
+    filters: Filters | None = None,
+    shortlist: int = SHORTLIST,
+    rank: Rank = "ritz",
+    color: int = HIGHLIGHT,
+    axle_slide: AxleSlide = "held",
+    table: StiffnessTable | None = None,
+    progress: Progress | None = None,
+) -> list[Suggestions]:
+    """Add the best beam again and again, the model analysed anew each time.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    steps : int
+        Most beams to add.
+    target : float, optional
+        Stop when the model is rigid and this stiff (N/m).
+    filters, shortlist, rank, color, axle_slide, table, progress
+        As for `suggest`; the inventory is used up on the way.
+
+    Returns
+    -------
+    list of Suggestions
+        One for each beam, its first suggestion the one taken; the last has none when nothing more
+        helps.
+
+    Raises
+    ------
+    UsageError
+        As for `suggest`.
+    """
+    filters = filters or Filters()
+    before = analyze(assembly, modes=1)
+    current = assembly
+    done: list[Suggestions] = []
+    for _ in range(steps):
+        if target is not None and _reached(before, target):
+            break
+        answer = suggest(
+            current,
+            count=1,
+            shortlist=shortlist,
+            rank=rank,
+            filters=filters,
+            pairs=False,
+            color=color,
+            axle_slide=axle_slide,
+            table=table,
+            before=before,
+            progress=progress,
+        )
+        taken = answer.suggestions[0] if answer.suggestions else None
+        if taken is None or merit(taken.report) <= merit(before):
+            done.append(replace(answer, suggestions=()))
+            break
+        done.append(replace(answer, suggestions=(replace(taken, rank=len(done) + 1),)))
+        new = taken.report.assembly
+        filters = carried_over(filters, current, new, taken.candidate, taken.change)
+        current, before = new, taken.report
+    return done
+
+
+def _reached(report: RigidityReport, target: float) -> bool:
+    if report.mobility.structural or report.rigidity is None:
+        return False
+    return report.rigidity.value >= target
