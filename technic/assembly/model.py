@@ -189,6 +189,8 @@ class FindingKind(StrEnum):
     """A part joined to nothing."""
     FLEXIBLE = "flexible"
     """Hose, chain, string, tyre: not modelled."""
+    INNER = "inner"
+    """A part that is not one rigid body: motor, actuator, shock absorber, universal joint."""
     GEARS = "gears"
     """Two gears in mesh."""
     WARNING = "warning"

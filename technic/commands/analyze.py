@@ -15,6 +15,7 @@ from technic.commands.options import (
     CalibrationOption,
     FixOption,
     GearsOption,
+    InnerOption,
     JsonOption,
     LibraryOption,
     MeasureOption,
@@ -85,7 +86,13 @@ def run(model: Path, options: AnalysisOptions) -> None:
 
     _check_targets(options)
     with Outputs(options) as outputs:
-        more = ModelOptions(options.library, options.no_library, options.shadow, options.gears)
+        more = ModelOptions(
+            library=options.library,
+            no_library=options.no_library,
+            shadow=options.shadow,
+            gears=options.gears,
+            inner=options.inner,
+        )
         how = reading(model, options.axle_slide, options.calibration, more)
         assembly = load(model, **how)
         if options.fix:
@@ -128,6 +135,7 @@ def analyze(
     axle_slide: AxleSlideOption = "held",
     calibration: CalibrationOption = None,
     gears: GearsOption = "off",
+    inner: InnerOption = "held",
     library: LibraryOption = None,
     no_library: NoLibraryOption = False,
     shadow: ShadowOption = None,
@@ -150,6 +158,7 @@ def analyze(
             axle_slide=axle_slide,
             calibration=calibration,
             gears=gears,
+            inner=inner,
             library=library,
             no_library=no_library,
             shadow=shadow,

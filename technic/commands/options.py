@@ -16,6 +16,8 @@ __all__ = [
     "FixOption",
     "Gears",
     "GearsOption",
+    "InnerMotion",
+    "InnerOption",
     "JsonOption",
     "LibraryOption",
     "Measure",
@@ -38,6 +40,7 @@ __all__ = [
 Measure = Literal["mean_square", "nodal"]
 AxleSlide = Literal["held", "free"]
 Gears = Literal["off", "on"]
+InnerMotion = Literal["held", "free"]
 PartModel = Literal["frame", "rigid"]
 View = Literal["iso", "front", "side", "top", "mode"]
 """The values that `technic.rigidity.analyze.analyze`, the LDraw reader and the pictures take."""
@@ -90,6 +93,13 @@ CalibrationOption = Annotated[
 GearsOption = Annotated[
     Gears,
     typer.Option("--gears", help="on: gears in mesh turn each other, a worm locks its gear."),
+]
+InnerOption = Annotated[
+    InnerMotion,
+    typer.Option(
+        "--inner",
+        help="Motors and actuators: held like braked ones, or their outputs free to move.",
+    ),
 ]
 LibraryOption = Annotated[
     Path | None,
@@ -146,6 +156,7 @@ class AnalysisOptions:
     axle_slide: AxleSlide = "held"
     calibration: Path | None = None
     gears: Gears = "off"
+    inner: InnerMotion = "held"
     library: Path | None = None
     no_library: bool = False
     shadow: Path | None = None

@@ -26,12 +26,15 @@ class ModelOptions:
         LDCad shadow library.
     gears : {"off", "on"}
         Whether gears in mesh turn each other.
+    inner : {"held", "free"}
+        Whether motors and actuators hold their position.
     """
 
     library: Path | None = None
     no_library: bool = False
     shadow: Path | None = None
     gears: Literal["off", "on"] = "off"
+    inner: Literal["held", "free"] = "held"
 
 
 def _sources(options: ModelOptions) -> dict[str, Any]:
@@ -90,14 +93,13 @@ def reading(
                 "--calibration is for LDraw models; an assembly file gives its own stiffnesses"
             )
         if more is not None and more != ModelOptions():
-            raise UsageError(
-                "--library, --shadow and --gears are for LDraw models; an assembly file says it all"
-            )
+            raise UsageError("--library, --shadow, --gears and --inner are for LDraw models")
         return {}
     options: dict[str, Any] = {"axle_slide": axle_slide}
     more = more or ModelOptions()
     options |= _sources(more)
     options["gears"] = more.gears
+    options["inner"] = more.inner
     if calibration is not None:
         from technic.assembly.stiffness import read_table
 

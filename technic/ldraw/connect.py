@@ -37,6 +37,7 @@ def connect(
     *,
     axle_slide: AxleSlide = "held",
     limits: Limits | None = None,
+    inner: Sequence[Joint] = (),
 ) -> tuple[tuple[Joint, ...], tuple[Finding, ...]]:
     """Return the joints between parts, and what is worth a sentence about them.
 
@@ -49,6 +50,8 @@ def connect(
         slides, and is no stop for the axle either.
     limits : Limits, optional
         How far from ideal features may be and still mate.
+    inner : sequence of Joint
+        Joints inside of parts, which are no matter of connectors; they come last.
 
     Returns
     -------
@@ -76,7 +79,7 @@ def connect(
         number = len(by_pair.get(seat.parts, [])) + 1
         joint_id = f"{parts[seat.parts[0]].id}~{parts[seat.parts[1]].id}@{number}"
         by_pair.setdefault(seat.parts, []).append(_seat(seat, table, joint_id))
-    joints = tuple(joint for pair in sorted(by_pair) for joint in by_pair[pair])
+    joints = (*(joint for pair in sorted(by_pair) for joint in by_pair[pair]), *inner)
     return joints, find(placed, matched, joints, limits)
 
 

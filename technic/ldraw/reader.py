@@ -29,6 +29,7 @@ from technic.ldraw.connect import AxleSlide, connect
 from technic.ldraw.document import Document, Placement, placements, poses, read
 from technic.ldraw.finder import LibrarySource, PartFinder, ShadowSource
 from technic.ldraw.gears import find_meshes, mesh_findings, mesh_joints
+from technic.ldraw.inner import InnerMotion, divide
 from technic.ldraw.library import LIBRARY_FAMILY
 from technic.parts.definition import PartDefinition
 
@@ -73,6 +74,7 @@ def load_ldraw(
     library: LibrarySource = None,
     shadow: ShadowSource = None,
     gears: Gears = "off",
+    inner: InnerMotion = "held",
 ) -> Assembly:
     """Read an LDraw model and find its connections.
 
@@ -91,6 +93,8 @@ def load_ldraw(
         LDCad shadow library: connectors of the library's parts.
     gears : {"off", "on"}
         Whether gears in mesh turn each other, or each by itself.
+    inner : {"held", "free"}
+        Whether motors and actuators hold their position or move freely.
 
     Returns
     -------
@@ -105,6 +109,8 @@ def load_ldraw(
     find = PartFinder(library, shadow, document)
     if gears not in ("off", "on"):
         raise UsageError(f"gears is 'off' or 'on', not {gears!r}")
+    if inner not in ("held", "free"):
+        raise UsageError(f"inner is 'held' or 'free', not {inner!r}")
     reading = read_parts(document, find, find.refused)
     if not reading.parts:
         raise InputError(
@@ -116,18 +122,21 @@ def load_ldraw(
             else "The parts library does not have them either.",
         )
     table = table or default_table()
-    joints, findings = connect(reading.parts, table, axle_slide=axle_slide)
-    meshes = find_meshes(reading.parts)
-    coupled = mesh_joints(reading.parts, meshes, joints, table) if gears == "on" else None
+    whole = divide(reading.parts, inner)
+    parts = whole.parts
+    joints, findings = connect(parts, table, axle_slide=axle_slide, inner=whole.joints)
+    meshes = find_meshes(parts)
+    coupled = mesh_joints(parts, meshes, joints, table) if gears == "on" else None
     return Assembly(
         name=Path(document.main.name).stem,
-        parts=reading.parts,
+        parts=parts,
         joints=joints + (coupled or ()),
         unknown=reading.unknown,
         findings=(
             *reading.findings,
             *findings,
-            *mesh_findings(reading.parts, meshes, coupled),
+            *whole.findings,
+            *mesh_findings(parts, meshes, coupled),
         ),
         source={"path": str(path), "sha256": document.sha256, "format": "ldraw"},
         imported=_summary(reading.parts, find, searched=library is not None),

@@ -28,6 +28,7 @@ FINDING_WORDS = {
     FindingKind.NO_PIN: ("pair of aligned holes with no pin", "pairs of aligned holes with no pin"),
     FindingKind.LOOSE: ("loose part", "loose parts"),
     FindingKind.FLEXIBLE: ("flexible item, not modelled", "flexible items, not modelled"),
+    FindingKind.INNER: ("part with inner motion", "parts with inner motion"),
     FindingKind.GEARS: ("pair of gears in mesh", "pairs of gears in mesh"),
     FindingKind.WARNING: ("warning", "warnings"),
 }

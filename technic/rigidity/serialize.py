@@ -261,7 +261,12 @@ def _model(report: RigidityReport) -> dict[str, Any]:
             if finding.kind in kinds
         ]
 
-    apart = (FindingKind.NEAR_MISS, FindingKind.OPEN_PORT, FindingKind.GEARS)
+    apart = (
+        FindingKind.NEAR_MISS,
+        FindingKind.OPEN_PORT,
+        FindingKind.GEARS,
+        FindingKind.INNER,
+    )
     return {
         "name": assembly.name,
         "parts": len(assembly.parts),
@@ -282,6 +287,7 @@ def _model(report: RigidityReport) -> dict[str, Any]:
         "import": _imported(report),
         "near_misses": details(FindingKind.NEAR_MISS),
         "gear_meshes": details(FindingKind.GEARS),
+        "inner_motion": details(FindingKind.INNER),
         "open_ports": len(details(FindingKind.OPEN_PORT)),
         "open_port_list": details(FindingKind.OPEN_PORT),
         "warnings": details(*(kind for kind in FindingKind if kind not in apart)),

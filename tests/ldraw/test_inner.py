@@ -1,0 +1,163 @@
+"""Parts that are not one rigid body: motors, actuators, shock absorbers, universal joints."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from technic.assembly.joint_types import JointType
+from technic.assembly.model import FindingKind, Part
+from technic.errors import SchemaError, UsageError
+from technic.geometry import Pose
+from technic.ldraw.inner import divide
+from technic.ldraw.reader import load_ldraw
+from technic.parts.catalogue import catalogue
+from technic.parts.inner import inner_parts, parse_inner
+from technic.rigidity.analyze import analyze
+from technic.units import LDU
+from tests.ldraw.bricks import rotation
+
+KNOWN = sorted(number for number in inner_parts() if catalogue().get(number) is not None)
+
+
+def placed(number: str, pose: Pose | None = None) -> Part:
+    definition = catalogue().get(number)
+    assert definition is not None
+    return Part(
+        f"m/1:{number}",
+        number,
+        definition.title,
+        pose or Pose.identity(),
+        definition.ports,
+        definition.body,
+        definition.mass_properties,
+        definition=definition,
+    )
+
+
+@pytest.mark.parametrize("number", KNOWN)
+def test_every_part_of_the_catalogue_divides_and_loses_nothing(number):
+    part = placed(number)
+    whole = divide([part], "free")
+    assert len(whole.parts) == 2, "the file's stretch catches no connector, or all of them"
+    rest, piece = whole.parts
+    assert rest.id == part.id
+    assert piece.id.startswith(f"{part.id}#")
+    names = [port.name for port in (*rest.ports, *piece.ports)]
+    assert sorted(names) == sorted(port.name for port in part.ports)
+    masses = [p.mass_properties for p in whole.parts]
+    assert sum(m.mass for m in masses) == pytest.approx(part.mass_properties.mass)
+    balance = sum(m.mass * m.centroid for m in masses) / part.mass_properties.mass
+    assert balance == pytest.approx(part.mass_properties.centroid)
+    (joint,) = whole.joints
+    assert joint.parts == (0, 1)
+    assert (joint.stiffness[joint.held] > 0.0).all()
+
+
+def test_a_motor_holds_unless_it_is_free():
+    held, free = divide([placed("95658")]), divide([placed("95658")], "free")
+    assert (len(held.parts), len(held.joints)) == (1, 0)
+    assert "--inner free" in held.findings[0].message
+    assert len(free.parts[1].ports) == 11
+    assert free.joints[0].type is JointType.HINGE
+
+
+def test_the_joint_turns_with_the_part():
+    pose = Pose(rotation([1, 2, 3], 0.7), np.array([0.1, 0.2, 0.3]))
+    (joint,) = divide([placed("95658", pose)], "free").joints
+    assert joint.axes[0] == pytest.approx(pose.directions(np.array([1.0, 0.0, 0.0])))
+    assert joint.point == pytest.approx(pose.translation)
+
+
+def test_a_shock_absorber_is_a_spring_with_a_stated_stiffness():
+    whole = divide([placed("41838")])
+    (joint,) = whole.joints
+    assert joint.stiffness[0] == 500.0
+    assert "not measured" in joint.provenance
+    assert joint.held.tolist() == [True, True, True, False, True, True]
+
+
+def test_a_universal_joint_passes_its_turning_on_and_bends():
+    (joint,) = divide([placed("61903")]).joints
+    assert joint.type is JointType.UNIVERSAL
+    assert abs(joint.axes[0] @ [0, 0, 1]) == pytest.approx(1.0)
+
+
+def test_parts_that_are_rigid_stay_as_they_are():
+    part = placed("32316")
+    whole = divide([part], "free")
+    assert whole.parts == (part,)
+    assert not whole.joints
+    assert not whole.findings
+
+
+def test_a_robot_with_motors_free_gains_one_motion_for_each(model):
+    held, free = (load_ldraw(model("fll_robot.mpd"), inner=inner) for inner in ("held", "free"))
+    motors = [f for f in held.findings if f.kind is FindingKind.INNER]
+    assert len(motors) == 4
+    assert len(free.parts) == len(held.parts) + 4
+    before, after = analyze(held, parts="rigid"), analyze(free, parts="rigid")
+    assert before.mobility.total == 97
+    assert after.mobility.total == 97 + 4
+
+
+ARM = """0 Arm
+1 71 0 0 0 1 0 0 0 1 0 0 0 1 61927.dat
+1 0 {x} 0 190 1 0 0 0 1 0 0 0 1 3673.dat
+"""
+
+
+def test_an_actuator_holds_or_slides(tmp_path):
+    path = tmp_path / "arm.ldr"
+    path.write_text(ARM.format(x=0))
+    totals = [
+        analyze(load_ldraw(path, inner=inner), parts="rigid").mobility.total
+        for inner in ("held", "free")
+    ]
+    assert totals[1] == totals[0] + 1
+
+
+def test_inner_is_held_or_free(model):
+    with pytest.raises(UsageError, match="inner"):
+        load_ldraw(model("hinged_L.ldr"), inner="loose")  # type: ignore[arg-type]
+
+
+GOOD = {
+    "ids": ["1"],
+    "kind": "motor",
+    "when": "free",
+    "source": "here",
+    "body": [
+        {
+            "name": "output",
+            "joint": "hinge",
+            "point": [0, 0, 0],
+            "axis": [1, 0, 0],
+            "along": [0, 1],
+            "radius": 1,
+            "share": 0.1,
+        }
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"kind": "wing"},
+        {"when": "later"},
+        {"source": None, "body": [{}]},
+        {"body": [GOOD["body"][0] | {"axis": [0, 0, 0]}]},
+        {"body": [GOOD["body"][0] | {"along": [1, 0]}]},
+        {"body": [GOOD["body"][0] | {"share": 1.5}]},
+        {"body": [GOOD["body"][0] | {"axial": -1.0}]},
+        {"body": [GOOD["body"][0] | {"joint": "universal"}]},
+        {"body": [GOOD["body"][0] | {"joint": "weld"}]},
+    ],
+)
+def test_faults_of_the_file_are_said(change):
+    assert parse_inner({"part": [GOOD]})["1"].bodies[0].high == pytest.approx(LDU)
+    with pytest.raises(SchemaError, match="part 1"):
+        parse_inner({"part": [GOOD | change]})
+    with pytest.raises(SchemaError, match="given twice"):
+        parse_inner({"part": [GOOD, GOOD]})
