@@ -11,10 +11,14 @@ import typer
 
 from technic.commands.options import (
     AnalysisOptions,
+    AnimateOption,
     AxleSlideOption,
     CalibrationOption,
+    CsvOption,
     FixOption,
     GearsOption,
+    GltfOption,
+    HeatmapOption,
     InnerOption,
     JsonOption,
     LibraryOption,
@@ -116,7 +120,7 @@ def run(model: Path, options: AnalysisOptions) -> None:
         missed = _demands(report, options)
         for sentence in missed:
             typer.echo(f"technic: {sentence}", err=True)
-        outputs.write(report)
+        outputs.write(model, report)
     if missed:
         raise typer.Exit(_BELOW_DEMAND)
 
@@ -129,6 +133,10 @@ def analyze(
     json: JsonOption = None,
     picture: PictureOption = None,
     report: ReportOption = None,
+    heatmap: HeatmapOption = None,
+    gltf: GltfOption = None,
+    csv: CsvOption = None,
+    animate: AnimateOption = None,
     view: ViewOption = "mode",
     fix: FixOption = None,
     measure: MeasureOption = "mean_square",
@@ -152,6 +160,10 @@ def analyze(
             json=json,
             picture=picture,
             report=report,
+            heatmap=heatmap,
+            gltf=gltf,
+            csv=csv,
+            animate=animate,
             view=view,
             fix=tuple(fix or ()),
             measure=measure,

@@ -10,12 +10,16 @@ import typer
 
 __all__ = [
     "AnalysisOptions",
+    "AnimateOption",
     "AxleSlide",
     "AxleSlideOption",
     "CalibrationOption",
+    "CsvOption",
     "FixOption",
     "Gears",
     "GearsOption",
+    "GltfOption",
+    "HeatmapOption",
     "InnerMotion",
     "InnerOption",
     "JsonOption",
@@ -59,6 +63,25 @@ ReportOption = Annotated[
         metavar="HTML",
         help="Write a page with the model in 3D, its motions and tables.",
     ),
+]
+HeatmapOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--heatmap",
+        metavar="MPD",
+        help="Write the model again with every part in the colour of its strain energy.",
+    ),
+]
+GltfOption = Annotated[
+    Path | None,
+    typer.Option("--gltf", metavar="GLB", help="Write the model with its worst mode as glTF."),
+]
+CsvOption = Annotated[
+    Path | None, typer.Option("--csv", metavar="DIR", help="Write the tables as CSV files.")
+]
+AnimateOption = Annotated[
+    Path | None,
+    typer.Option("--animate", metavar="GIF", help="Draw the worst mode as an animation."),
 ]
 ViewOption = Annotated[
     View, typer.Option("--view", help="Of pictures; mode: the view that shows the worst mode best.")
@@ -150,6 +173,10 @@ class AnalysisOptions:
     json: str | None = None
     picture: Path | None = None
     report: Path | None = None
+    heatmap: Path | None = None
+    gltf: Path | None = None
+    csv: Path | None = None
+    animate: Path | None = None
     view: View = "mode"
     fix: tuple[str, ...] = ()
     measure: Measure = "mean_square"

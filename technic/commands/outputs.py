@@ -35,9 +35,17 @@ class Outputs:
         from technic.report.files import check_writable
 
         self._options = options
-        for target in (options.picture, options.report):
+        for target in (
+            options.picture,
+            options.report,
+            options.heatmap,
+            options.gltf,
+            options.animate,
+        ):
             if target is not None:
                 check_writable(target)
+        if options.csv is not None and not options.csv.is_dir():
+            check_writable(options.csv)
         self._painter: Painter | None = None
         if options.picture is not None or options.report is not None:
             from technic.report.render import Painter
@@ -60,10 +68,16 @@ class Outputs:
         if not self._options.quiet:
             typer.echo(f"{what}: {path}", err=True)
 
-    def write(self, report: RigidityReport) -> None:
+    def write(self, model: Path, report: RigidityReport) -> None:
         """Write every file that was asked for.
 
         A machine that cannot draw gets all the others first.
+
+        Parameters
+        ----------
+        model : Path
+            The file that the report is of.
+        report : RigidityReport
 
         Raises
         ------
@@ -72,8 +86,58 @@ class Outputs:
         UsageError
             When a file cannot be written, or there is nothing to draw.
         """
+        options = self._options
+        if options.csv is not None:
+            from technic.report.spreadsheet import write_tables
+
+            write_tables(report, options.csv)
+            self._said("tables", options.csv)
+        if options.heatmap is not None:
+            self._heat_map(model, report, options.heatmap)
+        if options.gltf is not None:
+            from technic.report.gltf import write_gltf
+
+            if not report.assembly.parts:
+                raise UsageError("no glTF was written: the model has no part that was understood")
+            write_gltf(report, options.gltf)
+            self._said("glTF", options.gltf)
         if self._painter is not None:
             self._draw(report, self._painter)
+        if options.animate is not None:
+            self._animate(report, options.animate)
+
+    def _heat_map(self, model: Path, report: RigidityReport, path: Path) -> None:
+        from technic.report.heat_map import write_heat_map
+        from technic.report.wording import count
+
+        if model.suffix.lower() == ".json":
+            raise UsageError("--heatmap is for LDraw models; an assembly file has no colours")
+        found = write_heat_map(report, model, path)
+        if found.elsewhere:
+            parts = count(found.elsewhere, "part")
+            typer.echo(f"technic: heat map: {parts} in other files keep their colour", err=True)
+        if found.shared and not self._options.quiet:
+            lines = count(found.shared, "line")
+            typer.echo(
+                f"heat map: {lines} of submodels used more than once: coloured by the part with "
+                "the most energy",
+                err=True,
+            )
+        self._said("heat map", path)
+
+    def _animate(self, report: RigidityReport, path: Path) -> None:
+        from technic.report.files import write_bytes
+        from technic.report.film import film
+        from technic.report.render import Painter
+
+        if not report.assembly.parts:
+            raise UsageError("no film was made: the model has no part that was understood")
+        painter = Painter()
+        try:
+            write_bytes(path, painter.picture(film(report, view=self._options.view)))
+        finally:
+            painter.close()
+        self._said("animation", path)
 
     def _draw(self, report: RigidityReport, painter: Painter) -> None:
         from technic.report.drawing import drawing_of
