@@ -45,6 +45,7 @@ __all__ = [
     "Solid",
     "build_super_element",
     "condense",
+    "condense_and_lift",
     "element_stiffness",
     "free_modes",
     "mass_and_centroid",
@@ -225,6 +226,20 @@ def build_super_element(
 
 def condense(part_id: str, solid: Solid, ports: Sequence[Port], *, key: str = "") -> SuperElement:
     """Condense a factorised part onto its ports; parameters as for `build_super_element`."""
+    return condense_and_lift(part_id, solid, ports, key=key)[0]
+
+
+def condense_and_lift(
+    part_id: str, solid: Solid, ports: Sequence[Port], *, key: str = ""
+) -> tuple[SuperElement, Array]:
+    """Condense a factorised part, and say how its mesh follows the frames.
+
+    Returns
+    -------
+    element : SuperElement
+    lift : (3 n, 6 p) ndarray
+        The mesh's unknowns for unit twists of the frames.
+    """
     mesh = solid.mesh
     samples = [sample_port(mesh, port) for port in ports]
     kept, merged = _merge_shared(ports, samples)
@@ -247,7 +262,7 @@ def condense(part_id: str, solid: Solid, ports: Sequence[Port], *, key: str = ""
     mass = lift.T @ solid.apply_mass(lift)
     mass = (mass + mass.T) / 2.0
     error = _mass_error(solid, lift, stiffness, mass)
-    return SuperElement(
+    element = SuperElement(
         id=part_id,
         ports=tuple(port.name for port in chosen),
         points=points,
@@ -260,6 +275,7 @@ def condense(part_id: str, solid: Solid, ports: Sequence[Port], *, key: str = ""
         cell=mesh.settings.cell,
         key=key,
     )
+    return element, lift
 
 
 def mass_and_centroid(mesh: Mesh, mass: sparse.csr_array) -> tuple[float, Array]:

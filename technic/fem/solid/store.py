@@ -62,8 +62,12 @@ ASSEMBLIES = (
 )
 """Families (by their beginning) without a solid model: inner motion, or a block of unknown inside."""
 
+MOST_PORTS = 64
+"""A base plate with 209 holes would take 12 MB, three times what all other parts need together."""
+
 MOST_CELLS = 50_000
-"""Cells of the largest mesh: about 4 GB and three minutes."""
+"""Cells of the largest mesh: a plain 7L has 4,500 cells and takes 0.7 GB, growth is a little more than
+linear, and building has to stay within 6 GB."""
 
 CUT_SHARE = 1.7
 """Cells per volume of a full cell, cut ones included (1.1 for bricks, 1.7 for thin walls)."""
@@ -98,11 +102,12 @@ def has_solid_model(definition: PartDefinition) -> bool:
     """Return whether a part gets a super-element, as far as its definition tells.
 
     Parts need two frames to deform between; fasteners are rigid bodies or frame members (their
-    compliance is in the joints); assemblies with inner motion and electric units are no single solid.
+    compliance is in the joints); base plates have too many; assemblies with inner motion and
+    electric units are no single solid.
     """
     return (
         not definition.fastener
-        and len(solid_ports(definition)) > 1
+        and 1 < len(solid_ports(definition)) <= MOST_PORTS
         and not definition.family.startswith(ASSEMBLIES)
     )
 

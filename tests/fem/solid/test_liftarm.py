@@ -99,8 +99,9 @@ def test_mesh_convergence() -> None:
     LOG.info(
         "order %s, limit %s, shipped %s, off by %s", order, limit, shipped, shipped / limit - 1
     )
-    # Re-entrant edges at the bores keep the order near 1, whatever the polynomial.
-    assert order.min() > 0.8
+    # Quadratic displacement on a smooth solution would give 4; re-entrant edges at the bores and cut
+    # cells bring it down.
+    assert order.min() > 1.5
     assert shipped == pytest.approx(limit, rel=0.02)
 
 
