@@ -45,7 +45,7 @@ Measure = Literal["mean_square", "nodal"]
 AxleSlide = Literal["held", "free"]
 Gears = Literal["off", "on"]
 InnerMotion = Literal["held", "free"]
-PartModel = Literal["frame", "rigid"]
+PartModel = Literal["solid", "frame", "rigid"]
 View = Literal["iso", "front", "side", "top", "mode"]
 """The values that `technic.rigidity.analyze.analyze`, the LDraw reader and the pictures take."""
 
@@ -149,7 +149,11 @@ ModesOption = Annotated[
 ]
 PartModelOption = Annotated[
     PartModel,
-    typer.Option("--parts", help="frame: beams bend; rigid: only joints give way."),
+    typer.Option(
+        "--parts",
+        help="solid: condensed solid models where they are shipped; frame: beams bend; "
+        "rigid: only joints give way.",
+    ),
 ]
 RequireRigidOption = Annotated[
     bool, typer.Option("--require-rigid", help="Exit with 1 when the model is not rigid.")

@@ -36,14 +36,19 @@ from technic.rigidity.sentences import motion_sentence, not_modelled, reason
 from technic.rigidity.uncertainty import rigidity_interval
 from technic.rigidity.worst_case import mode_of, node_fields, rigid_parts, weak_spots
 from technic.system.assemble import ElementFactory, System, assemble, element_of, rigid_element_of
+from technic.system.part_models import models_of, solid_element_of
 from technic.tolerances import MAIN_COMPONENT_SHARE, MOBILITY_GAP
 
 __all__ = ["Measure", "PartModel", "analyze"]
 
 Measure = Literal["mean_square", "nodal"]
-PartModel = Literal["frame", "rigid"]
+PartModel = Literal["solid", "frame", "rigid"]
 
-FACTORIES: dict[str, ElementFactory] = {"frame": element_of, "rigid": rigid_element_of}
+FACTORIES: dict[str, ElementFactory] = {
+    "solid": solid_element_of,
+    "frame": element_of,
+    "rigid": rigid_element_of,
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,8 +79,9 @@ def analyze(
         independent of the mesh), or the unweighted node displacements of the paper.
     modes : int
         Elastic modes of the heaviest component.
-    parts : {"frame", "rigid"}
-        What parts are made of.
+    parts : {"solid", "frame", "rigid"}
+        What parts are made of: condensed solid models where they are shipped (frame members
+        elsewhere), frame members, or rigid bodies.
     table : StiffnessTable, optional
         Where the joints' stiffnesses came from; when some of them were measured, the rigidity gets a
         95 % interval.
@@ -136,6 +142,7 @@ def analyze(
             for b, (rigidity, _) in zip(bodies, found, strict=True)
         ),
         unknowns=system.size,
+        part_models=models_of(assembly, parts),
         mass=system.mass,
         qualifier=_qualifier(assembly),
         not_modelled=not_modelled(assembly),

@@ -186,7 +186,7 @@ def component_motions(
         p: _carry(kin, bodies[p], p)[np.ix_(dofs, dofs)] for p in parts
     }  # twist of the body's head -> twist of the part
     blocks: list[Block] = []
-    for k in links:
+    for k in _needed(kin, links):
         owner = kin.owners[k]
         rows = kin.held[k]
         if len(owner) == 2 and bodies[owner[0]] == bodies[owner[1]]:
@@ -207,6 +207,37 @@ def component_motions(
         smallest_kept=space.smallest_kept,
         largest_dropped=space.largest_dropped,
     )
+
+
+def _needed(kin: Kinematics, links: list[int]) -> list[int]:
+    """Leave out joints that follow from others: of parts joined pairwise at one place in the same way, a
+    chain is enough.
+    """
+    joints = kin.assembly.joints
+    heads: dict[tuple[bytes, int], int] = {}
+    out = []
+    for k in links:
+        if k >= len(joints):
+            out.append(k)
+            continue
+        held = kin.held[k]
+        place = np.round(joints[k].point, 9) + 0.0
+        # a ball joint has no axes to agree on
+        ball = held[:3].all() and not held[3:].any()
+        axes = np.zeros(9) if ball else np.round(joints[k].axes.ravel(), 9) + 0.0
+        key = np.concatenate([place, axes, held]).tobytes()
+        a, b = (_head(heads, key, p) for p in kin.owners[k])
+        if a != b:
+            heads[key, a] = b
+            out.append(k)
+    return out
+
+
+def _head(heads: dict[tuple[bytes, int], int], key: bytes, part: int) -> int:
+    """Return the part that stands for all those chained to `part` at a place."""
+    while (key, part) in heads:
+        part = heads[key, part]
+    return part
 
 
 def _merge_fixed(kin: Kinematics, parts: tuple[int, ...], links: list[int]) -> dict[int, int]:

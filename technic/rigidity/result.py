@@ -230,6 +230,8 @@ class RigidityReport:
         Number of unknowns of the system.
     mass : float
         Of the whole model (kg).
+    part_models : mapping of str to int
+        How many parts are solid models, frame members, rigid bodies.
     qualifier : str
         "", "at least" or "at most": how the count of motions is to be read.
     not_modelled : tuple of str
@@ -251,6 +253,7 @@ class RigidityReport:
     components: tuple[Component, ...]
     unknowns: int
     mass: float
+    part_models: Mapping[str, int] = field(default_factory=dict)
     qualifier: str = ""
     not_modelled: tuple[str, ...] = ()
     timings: Mapping[str, float] = field(default_factory=dict)

@@ -273,6 +273,7 @@ def _model(report: RigidityReport) -> dict[str, Any]:
         "joints": len(assembly.joints),
         "components": len(report.components),
         "dof": report.unknowns,
+        "part_models": dict(report.part_models),
         "mass_kg": report.mass,
         "size_mm": size_mm(assembly),
         "unknown_parts": [
