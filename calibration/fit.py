@@ -144,9 +144,9 @@ def fit(
         kept = tuple(k for k, value in zip(every, t, strict=True) if value > limit)
         if kept != every:
             state = _converge(data, forward, begin, kept, loss)
+    _refuse_contradiction(state, readings, begin)
     if not state.active:
         raise FitError("no stiffness shows in these readings: the loads hardly move the rigs")
-    _refuse_contradiction(state, readings, begin)
     return _result(data, state, readings)
 
 
@@ -184,7 +184,9 @@ def _converge(
         misfit = data.moved - value - columns @ shift
         scatter = _scatter(misfit, data.rounding, size, len(active) + len(shift), loss)
         # at the start every stiffness is a guess: what shows is decided where the fit ends up
-        found = _identifiable(slope, columns, np.hypot(data.rounding, scatter * size))
+        # (readings that contradict each other are refused at the end, not called silent)
+        spread = min(scatter, CONTRADICTION)
+        found = _identifiable(slope, columns, np.hypot(data.rounding, spread * size))
         if found != active and turn < _OUTER // 2:
             active = found
             log_s = np.where(np.isin(np.arange(len(begin)), active), log_s, begin)

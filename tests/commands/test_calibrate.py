@@ -1,0 +1,185 @@
+"""`technic calibrate` from the command line, and its table in `technic analyze`."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tomllib
+
+import pytest
+
+import calibration
+from technic import cli
+
+PAIR = """0 Pair
+1 4 0 0 0 1 0 0 0 1 0 0 0 1 32316.dat
+1 4 0 -20 60 1 0 0 0 1 0 0 0 1 32316.dat
+1 0 0 -10 40 0 1 0 1 0 0 0 0 1 2780.dat
+1 0 0 -10 20 0 1 0 1 0 0 0 0 1 2780.dat
+"""
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run the program in this process: exit code, standard output, standard error."""
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["technic", *map(str, arguments)])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as end:
+            code = int(end.code or 0)
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return call
+
+
+@pytest.fixture
+def sample(tmp_path):
+    """Copy of a shipped sample file."""
+
+    def copy(name):
+        path = tmp_path / name
+        path.write_bytes(calibration.files().joinpath("samples", name).read_bytes())
+        return path
+
+    return copy
+
+
+def test_samples_say_that_they_are_synthetic_and_give_the_truth_back(run, sample):
+    truth = {
+        "pins_synthetic.csv": {"shear": 65625.0, "tilt": 0.240},
+        "axles_synthetic.csv": {"spin": 0.16, "tilt": 0.16, "shear": 1e4},
+    }
+    for name, values in truth.items():
+        path = sample(name)
+        assert path.read_text().startswith("# SYNTHETIC")
+        code, out, _ = run("calibrate", path, "--json", "-")
+        content = json.loads(out)
+        assert code == 0
+        assert content["schema"] == "technic-calibration/1"
+        found = {p["motion"]: p for p in content["parameters"]}
+        for motion, value in values.items():
+            low, high = found[motion]["interval_95"]
+            assert found[motion]["identifiable"]
+            # seven intervals of 95 %: one may miss by a little
+            assert 0.97 * low < value < 1.03 * high
+        count = sum(p["identifiable"] for p in content["parameters"])
+        assert len(content["correlation"]["matrix"]) == count
+        assert len(content["residuals"]) == content["readings"] == 81
+        assert content["grid_search"]["agrees"]
+
+
+def test_one_pose_fits_the_shear_and_warns(run, sample):
+    code, out, err = run("calibrate", sample("one_pose_synthetic.csv"), "--json", "-")
+    content = json.loads(out)
+    assert code == 0
+    shear, tilt = content["parameters"]
+    assert (shear["motion"], shear["identifiable"]) == ("shear", True)
+    assert (tilt["motion"], tilt["identifiable"], tilt["interval_95"]) == ("tilt", False, None)
+    assert any("one pose only" in said for said in content["warnings"])
+    assert any("Measure also pose flat" in said for said in content["warnings"])
+    assert "one pose only" in err
+    code, out, err = run("calibrate", sample("one_pose_synthetic.csv"))
+    assert (code, err) == (0, "")
+    assert "not identifiable" in out
+
+
+def test_the_table_gives_the_analysis_an_interval(run, sample, tmp_path):
+    target, model = tmp_path / "pins.toml", tmp_path / "pair.ldr"
+    model.write_text(PAIR)
+    assert run("calibrate", sample("pins_synthetic.csv"), "--out", target, "-q") == (0, "", "")
+    table = tomllib.loads(target.read_text())
+    assert table["schema"] == "technic-stiffness/1"
+    assert table["calibration"]["readings"] == 81
+    assert len(table["calibration"]["sha256"]) == 64
+    shear = table["connection"]["pin/pin_hole"]["shear"]
+    assert shear["provenance"] == "calibrated"
+    assert shear["interval_95"][0] < shear["value"] < shear["interval_95"][1]
+    _, plain, _ = run("analyze", model, "--json", "-")
+    _, out, _ = run("analyze", model, "--json", "-", "--calibration", target)
+    rigidity = json.loads(out)["rigidity"]
+    low, high = rigidity["interval_95"]
+    assert low < rigidity["value_n_per_m"] < high
+    assert json.loads(plain)["rigidity"]["interval_95"] is None
+    assert "calibrated" in json.loads(out)["joint_stiffness"][0]["provenance"]
+    _, out, _ = run("analyze", model, "--calibration", target)
+    assert "with 95 % confidence" in out
+    code, out, _ = run(
+        "deflect", model, "--calibration", target, "--fix", "2:32316", "--hang", "3:32316:hole5:50g"
+    )
+    assert code == 0
+
+
+def test_template_can_be_built_filled_and_calibrated(run, tmp_path):
+    folder = tmp_path / "new" / "rig"
+    code, out, err = run("calibrate", "--template", folder)
+    assert (code, err) == (0, "")
+    names = {path.name for path in folder.iterdir()}
+    assert {
+        "readings.csv",
+        "readings.schema.json",
+        "protocol.md",
+        "rigs.toml",
+        "pin-pair.ldr",
+    } <= names
+    assert set(out.split()) == {str(folder / name) for name in names}
+    assert run("calibrate", folder / "readings.csv", "--rigs", folder / "rigs.toml")[0] == 0
+    assert run("analyze", folder / "pin-pair.ldr", "-q")[0] == 0
+    code, _, err = run("calibrate", "--template", folder)
+    assert code == 2
+    assert "already has" in err
+
+
+def test_protocol_in_the_package_is_the_page_of_the_docs(repo):
+    shipped = calibration.files().joinpath("template", "protocol.md").read_text("utf-8")
+    page = (repo / "docs" / "calibration.md").read_text("utf-8")
+    assert page.startswith(shipped.rstrip())
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("calibrate",),
+        ("calibrate", "{csv}", "--template", "{dir}"),
+        ("calibrate", "{csv}", "--out", "/no/such/directory/x.toml"),
+        ("calibrate", "{csv}", "--json", "/no/such/directory/x.json"),
+    ],
+)
+def test_usage_errors(run, sample, tmp_path, arguments):
+    names = {"csv": sample("pins_synthetic.csv"), "dir": tmp_path / "t"}
+    code, out, err = run(*(a.format(**names) for a in arguments))
+    assert (code, out) == (2, "")
+    assert "Traceback" not in err
+
+
+def test_bad_readings_exit_with_3_by_row_and_column(run, sample, tmp_path):
+    path = sample("pins_synthetic.csv")
+    path.write_text(path.read_text().replace(",32,50,", ",32,-50,", 1))
+    code, out, err = run("calibrate", path, "--out", tmp_path / "x.toml")
+    assert (code, out) == (3, "")
+    assert "column 'load_g'" in err
+    assert "row 7" in err
+    assert not (tmp_path / "x.toml").exists()
+
+
+def test_contradictory_readings_exit_with_3(run, sample):
+    path = sample("pins_synthetic.csv")
+    lines = path.read_text().splitlines()
+    for k in range(3, len(lines)):
+        cells = lines[k].split(",")
+        cells[9] = str(float(cells[9]) + 9 * (k % 3))
+        lines[k] = ",".join(cells)
+    path.write_text("\n".join(lines))
+    code, out, err = run("calibrate", path)
+    assert (code, out) == (3, "")
+    assert "contradict each other" in err
+    assert "rows" in err
+
+
+def test_missing_files(run, tmp_path, sample):
+    assert run("calibrate", tmp_path / "none.csv")[0] == 3
+    assert run("calibrate", sample("pins_synthetic.csv"), "--rigs", tmp_path / "none.toml")[0] == 3
+    assert run("calibrate", sample("pins_synthetic.csv"), "--base", tmp_path / "none.toml")[0] == 3
