@@ -17,11 +17,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from technic.assembly.builder import Linkage
     from technic.assembly.model import Assembly
+    from technic.design.suggest import suggest
     from technic.errors import TechnicError
     from technic.loading import load, save
     from technic.rigidity.analyze import analyze
     from technic.rigidity.result import RigidityReport
-    from technic.design.suggest import suggest
+    from technic.statics.calibration import calibrate
     from technic.system.assemble import System, assemble
 
 __version__ = "0.1.0"
@@ -34,6 +35,7 @@ _HOMES = {
     "TechnicError": "technic.errors",
     "analyze": "technic.rigidity.analyze",
     "assemble": "technic.system.assemble",
+    "calibrate": "technic.statics.calibration",
     "load": "technic.loading",
     "suggest": "technic.design.suggest",
     "save": "technic.loading",
@@ -49,6 +51,7 @@ __all__ = [
     "__version__",
     "analyze",
     "assemble",
+    "calibrate",
     "load",
     "save",
     "suggest",

@@ -18,6 +18,7 @@ PUBLIC = [
     "__version__",
     "analyze",
     "assemble",
+    "calibrate",
     "load",
     "save",
     "suggest",
