@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
+from technic.assembly.model import Source
 from technic.errors import UsageError
 from technic.ldraw.sections import Document, read
 from technic.ldraw.syntax import Text, normalise
@@ -75,6 +76,18 @@ def _recolored(source: Text, colors: Mapping[int, str]) -> Text:
     return replace(source, text="".join(pieces))
 
 
+def _inside(document: Document, source: Source) -> bool:
+    """Return whether a part's line stands in this file: follow the references that lead to it."""
+    section = document.main
+    for line in source.lines[:-1]:
+        named = [ref.name for ref in section.references if ref.number == line]
+        found = section.scope.get(normalise(named[0])) if named else None
+        if found is None:
+            return False
+        section = found
+    return any(ref.number == source.line for ref in section.references)
+
+
 def heat_map(report: RigidityReport, document: Document) -> HeatMap:
     """Return the document recoloured by the strain energy of the worst mode.
 
@@ -95,15 +108,13 @@ def heat_map(report: RigidityReport, document: Document) -> HeatMap:
     most = float(shares.max(initial=0.0))
     if most == 0.0:
         raise UsageError("no heat map: the model has nothing elastic that a load could deform")
-    own = {normalise(section.name) for section in document.sections}
     energy: dict[int, list[float]] = {}
     elsewhere = 0
     for part, share in zip(report.assembly.parts, shares, strict=True):
-        source = part.source
-        if source is None or normalise(source.submodel.rpartition("/")[2]) not in own:
+        if part.source is None or not _inside(document, part.source):
             elsewhere += 1
             continue
-        energy.setdefault(source.line, []).append(float(share))
+        energy.setdefault(part.source.line, []).append(float(share))
     colors = {line: direct_color(heat_color(max(found) / most)) for line, found in energy.items()}
     text = _recolored(document.source, colors)
     return HeatMap(text, most, sum(len(found) > 1 for found in energy.values()), elsewhere)
