@@ -19,7 +19,7 @@ from technic.fem.element import Element
 from technic.geometry import Array, shift_twist, turn_twist
 from technic.parts.definition import FrameBody, MassProperties, Material, Section
 
-__all__ = ["frame_element", "member_matrices"]
+__all__ = ["frame_element", "local_mass", "local_stiffness", "member_matrices", "subdivide"]
 
 SAME_NODE = 0.1
 """Attachments closer than this share of the section's size (root of its area) along a member share a
@@ -52,7 +52,7 @@ def frame_element(body: FrameBody, properties: MassProperties, attachments: Arra
     InputError
         A member has no length.
     """
-    node_points, pairs, member_of, node_of = _subdivide(body, attachments)
+    node_points, pairs, member_of, node_of = subdivide(body, attachments)
     n = len(node_points)
     stiffness = np.zeros((6 * n, 6 * n))
     mass = np.zeros((6 * n, 6 * n))
@@ -106,7 +106,7 @@ def _complete_inertia(mass: Array, rigid: Array, properties: MassProperties) -> 
         mass[own, own] += missing / nodes
 
 
-def _subdivide(
+def subdivide(
     body: FrameBody, attachments: Array
 ) -> tuple[Array, list[tuple[int, int]], list[int], list[int]]:
     """Place nodes: member ends, attachments projected on the nearest member, equal refinement.
@@ -142,7 +142,8 @@ def _subdivide(
                 node_of[k] = node
         chain.append((1.0, int(last)))
         for (s, a), (e, b) in pairwise(chain):
-            pieces = max(1, int(np.ceil((e - s) * lengths[m] / longest[m] - 1e-9)))
+            # attachments are rounded to a nanometre: that must not add a piece
+            pieces = max(1, int(np.ceil((e - s) * lengths[m] / longest[m] - 1e-6)))
             inner = list(range(len(nodes), len(nodes) + pieces - 1))
             nodes += [starts[m] + (s + (e - s) * k / pieces) * spans[m] for k in range(1, pieces)]
             pairs += pairwise([a, *inner, b])
@@ -207,8 +208,8 @@ def member_matrices(
         raise InputError("the normal of a frame member is parallel to the member")
     z = z / size
     turn = np.kron(np.eye(2), turn_twist(np.array([x, np.cross(z, x), z])))
-    k = _local_stiffness(lengths, section, material)
-    m = _local_mass(lengths, section, material)
+    k = local_stiffness(lengths, section, material)
+    m = local_mass(lengths, section, material)
     return turn.T @ k @ turn, turn.T @ m @ turn
 
 
@@ -233,9 +234,10 @@ def _shear_ratio(lengths: Array, inertia: float, shear: float, material: Materia
     return 12.0 * material.young_pa * inertia / (material.shear_pa * shear * lengths**2)
 
 
-def _local_stiffness(lengths: Array, section: Section, material: Material) -> Array:
+def local_stiffness(lengths: Array, section: Section, material: Material) -> Array:
+    """Return the stiffness of members in their own axes, (m, 12, 12); lengths may be complex."""
     e, g = material.young_pa, material.shear_pa
-    k = np.zeros((len(lengths), 12, 12))
+    k = np.zeros((len(lengths), 12, 12), dtype=lengths.dtype)
     pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
     k[:, *AXIAL] = (e * section.area / lengths)[:, None, None] * pair
     k[:, *TORSION] = (g * section.torsion / lengths)[:, None, None] * pair
@@ -256,9 +258,10 @@ def _local_stiffness(lengths: Array, section: Section, material: Material) -> Ar
     return k
 
 
-def _local_mass(lengths: Array, section: Section, material: Material) -> Array:
+def local_mass(lengths: Array, section: Section, material: Material) -> Array:
+    """Return the consistent mass of members in their own axes, (m, 12, 12); lengths may be complex."""
     rho = material.density
-    m = np.zeros((len(lengths), 12, 12))
+    m = np.zeros((len(lengths), 12, 12), dtype=lengths.dtype)
     linear = lengths[:, None, None] / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]])
     m[:, *AXIAL] = rho * section.area * linear
     m[:, *TORSION] = rho * (section.inertia_y + section.inertia_z) * linear

@@ -1,0 +1,1 @@
+"""Move the joints of a linkage so that it becomes as rigid as it can be with little change."""
