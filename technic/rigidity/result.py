@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from technic.assembly.model import Assembly
@@ -265,3 +267,21 @@ class RigidityReport:
         from technic.rigidity.serialize import to_dict
 
         return to_dict(self)
+
+    # Reports stand above the mechanics, which do not know them: the two below are found by name when
+    # somebody asks to see something, and nothing here depends on them.
+
+    def _repr_html_(self) -> str:
+        """Return a short summary, as notebooks show the value of a cell."""
+        return str(import_module("technic.report.html.notebook").summary(self))
+
+    def show(self, path: Path | None = None) -> Path | None:
+        """Show the whole page in the notebook or the browser; see `technic.report.html.notebook`.
+
+        Parameters
+        ----------
+        path : Path, optional
+            Where to write the page; a temporary file when left out.
+        """
+        shown: Path | None = import_module("technic.report.html.notebook").show(self, path)
+        return shown

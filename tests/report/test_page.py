@@ -265,3 +265,25 @@ def test_time_for_150_parts() -> None:
     began = time.perf_counter()
     page(report)
     assert time.perf_counter() - began < 3.0
+
+
+def test_notebook_summary_escapes(pair: RigidityReport) -> None:
+    name = "<script>alert(1)</script>"
+    report = replace(pair, assembly=replace(pair.assembly, name=name))
+    html = report._repr_html_()
+    assert "<script>" not in html
+    assert "&lt;script&gt;" in html
+    assert "N/m" in html
+
+
+def test_show_opens_the_page_in_the_browser(
+    pair: RigidityReport, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import webbrowser
+
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    path = pair.show(tmp_path / "page.html")
+    assert path is not None
+    assert opened == [path.as_uri()]
+    assert path.read_text(encoding="utf-8") == page(pair)

@@ -31,7 +31,7 @@ from technic.rigidity.serialize import size_mm
 if TYPE_CHECKING:
     from jinja2 import Template
 
-__all__ = ["page", "write_page"]
+__all__ = ["facts", "page", "write_page"]
 
 _PICTURE_WIDTH = 1280
 
@@ -87,9 +87,9 @@ def _embedded(picture: bytes) -> str:
     return "data:image/webp;base64," + base64.b64encode(stream.getvalue()).decode("ascii")
 
 
-def _facts(report: RigidityReport) -> list[tuple[str, str, str]]:
+def facts(report: RigidityReport) -> list[tuple[str, str, str]]:
     """Return the numbers at the top: name, value, remark."""
-    facts: list[tuple[str, str, str]] = []
+    found: list[tuple[str, str, str]] = []
     rigidity = report.rigidity
     if rigidity is not None:
         sure = (
@@ -97,9 +97,9 @@ def _facts(report: RigidityReport) -> list[tuple[str, str, str]]:
             if rigidity.interval_95 is None
             else "95 % interval: {} to {} N/m".format(*(number(v) for v in rigidity.interval_95))
         )
-        facts.append(("Rigidity, worst case", f"{number(rigidity.value)} N/m", sure))
+        found.append(("Rigidity, worst case", f"{number(rigidity.value)} N/m", sure))
         if rigidity.measure == "mean_square":
-            facts.append(
+            found.append(
                 (
                     "Softest way to push it",
                     f"{number(rigidity.compliance_mm_per_n)} mm",
@@ -107,17 +107,17 @@ def _facts(report: RigidityReport) -> list[tuple[str, str, str]]:
                 )
             )
         if rigidity.frequency_hz is not None:
-            facts.append(
+            found.append(
                 ("Lowest natural frequency", f"{number(rigidity.frequency_hz)} Hz", "of its own")
             )
     mobility = report.mobility
     said = [f"{mobility.spinning} spin", f"{mobility.sliding} slide", f"{mobility.idle} idle"]
     qualifier = f"{report.qualifier} " if report.qualifier else ""
-    facts.append(("Motions", f"{qualifier}{mobility.structural}", "and " + ", ".join(said)))
+    found.append(("Motions", f"{qualifier}{mobility.structural}", "and " + ", ".join(said)))
     size = " x ".join(number(value) for value in size_mm(report.assembly))
     parts = count(len(report.assembly.parts), "part")
-    facts.append(("Model", parts, f"{size} mm, {number(report.mass * 1e3)} g"))
-    return facts
+    found.append(("Model", parts, f"{size} mm, {number(report.mass * 1e3)} g"))
+    return found
 
 
 def _softest(report: RigidityReport) -> str:
@@ -171,7 +171,7 @@ def page(
         tone=_TONES[report.verdict],
         verdict=report.verdict.value,
         reason=report.reason,
-        facts=_facts(report),
+        facts=facts(report),
         softest=_softest(report),
         moves=report.mobility.total > report.mobility.idle,
         picture=None if picture is None else _embedded(picture),
