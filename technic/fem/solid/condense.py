@@ -58,6 +58,9 @@ DEPENDENT = 1e-6
 most compliant one moves them by, lengths scaled. Independent frames at a pitch of 8 mm have 1e-4 and
 more; frames that share their nodes 1e-12."""
 
+COLUMNS, ROWS = 48, 20_000
+"""Columns solved for, and rows transformed, at once."""
+
 LENGTH = 4e-3
 """Length by which rotations are scaled where ports are compared (half a pitch) (m)."""
 
@@ -245,9 +248,13 @@ def condense_and_lift(
     kept, merged = _merge_shared(ports, samples)
     chosen = [ports[i] for i in kept]
     rows = sparse.vstack([frame_rows(mesh, ports[i], samples[i]) for i in kept]).tocsr()
-    right = rows.T.toarray()
-    shapes = solid.factor.solve(right)
-    flexibility = right.T @ shapes
+    # A few columns at a time, and in place below: with dozens of ports this array is the largest.
+    unknowns = rows.shape[0]
+    shapes = np.empty((rows.shape[1], unknowns))
+    for begin in range(0, unknowns, COLUMNS):
+        part = slice(begin, begin + COLUMNS)
+        shapes[:, part] = solid.factor.solve(rows[part].T.toarray())
+    flexibility = np.asarray(rows @ shapes)
     flexibility = (flexibility + flexibility.T) / 2.0
     points = np.array([port.position for port in chosen])
     _, centroid = mass_and_centroid(solid.mesh, solid.mass)
@@ -258,8 +265,15 @@ def condense_and_lift(
     scale = np.tile([1.0, 1.0, 1.0, LENGTH, LENGTH, LENGTH], len(chosen))
     left = np.linalg.pinv(motion * scale[:, None]) * scale
     follow = left @ (np.eye(len(motion)) - flexibility @ stiffness)
-    lift = shapes @ stiffness + solid.rigid @ follow
-    mass = lift.T @ solid.apply_mass(lift)
+    rigid = solid.rigid
+    lift = shapes
+    for begin in range(0, len(lift), ROWS):
+        part = slice(begin, begin + ROWS)
+        lift[part] = shapes[part] @ stiffness + rigid[part] @ follow
+    mass = np.empty((unknowns, unknowns))
+    for begin in range(0, unknowns, COLUMNS):
+        part = slice(begin, begin + COLUMNS)
+        mass[:, part] = lift.T @ solid.apply_mass(np.ascontiguousarray(lift[:, part]))
     mass = (mass + mass.T) / 2.0
     error = _mass_error(solid, lift, stiffness, mass)
     element = SuperElement(

@@ -65,9 +65,9 @@ ASSEMBLIES = (
 MOST_PORTS = 64
 """A base plate with 209 holes would take 12 MB, three times what all other parts need together."""
 
-MOST_CELLS = 50_000
-"""Cells of the largest mesh: a plain 7L has 4,500 cells and takes 0.7 GB, growth is a little more than
-linear, and building has to stay within 6 GB."""
+MOST_CELLS = 30_000
+"""Cells of the largest mesh: a plain 7L has 4,500 and takes 0.7 GB, a frame 5 x 11 has 22,000 and takes
+up to 4.6 GB; building has to stay within 6 GB."""
 
 CUT_SHARE = 1.7
 """Cells per volume of a full cell, cut ones included (1.1 for bricks, 1.7 for thin walls)."""
