@@ -191,6 +191,8 @@ class FindingKind(StrEnum):
     """Hose, chain, string, tyre: not modelled."""
     INNER = "inner"
     """A part that is not one rigid body: motor, actuator, shock absorber, universal joint."""
+    OVERRIDE = "override"
+    """What the user corrected in a file of his own."""
     GEARS = "gears"
     """Two gears in mesh."""
     WARNING = "warning"

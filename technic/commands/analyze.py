@@ -26,6 +26,7 @@ from technic.commands.options import (
     MinRigidityOption,
     ModesOption,
     NoLibraryOption,
+    OverridesOption,
     PartModelOption,
     PictureOption,
     QuietOption,
@@ -96,6 +97,7 @@ def run(model: Path, options: AnalysisOptions) -> None:
             shadow=options.shadow,
             gears=options.gears,
             inner=options.inner,
+            overrides=options.overrides,
         )
         how = reading(model, options.axle_slide, options.calibration, more)
         assembly = load(model, **how)
@@ -144,6 +146,7 @@ def analyze(
     calibration: CalibrationOption = None,
     gears: GearsOption = "off",
     inner: InnerOption = "held",
+    overrides: OverridesOption = None,
     library: LibraryOption = None,
     no_library: NoLibraryOption = False,
     shadow: ShadowOption = None,
@@ -171,6 +174,7 @@ def analyze(
             calibration=calibration,
             gears=gears,
             inner=inner,
+            overrides=overrides,
             library=library,
             no_library=no_library,
             shadow=shadow,

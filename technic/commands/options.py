@@ -29,6 +29,7 @@ __all__ = [
     "MinRigidityOption",
     "ModesOption",
     "NoLibraryOption",
+    "OverridesOption",
     "PartModel",
     "PartModelOption",
     "PictureOption",
@@ -124,6 +125,14 @@ InnerOption = Annotated[
         help="Motors and actuators: held like braked ones, or their outputs free to move.",
     ),
 ]
+OverridesOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--overrides",
+        metavar="TOML",
+        help="Your corrections: connections to add, remove or retype, parts to ignore or to weld.",
+    ),
+]
 LibraryOption = Annotated[
     Path | None,
     typer.Option(
@@ -188,6 +197,7 @@ class AnalysisOptions:
     calibration: Path | None = None
     gears: Gears = "off"
     inner: InnerMotion = "held"
+    overrides: Path | None = None
     library: Path | None = None
     no_library: bool = False
     shadow: Path | None = None

@@ -28,6 +28,8 @@ class ModelOptions:
         Whether gears in mesh turn each other.
     inner : {"held", "free"}
         Whether motors and actuators hold their position.
+    overrides : Path or None
+        File of corrections.
     """
 
     library: Path | None = None
@@ -35,6 +37,7 @@ class ModelOptions:
     shadow: Path | None = None
     gears: Literal["off", "on"] = "off"
     inner: Literal["held", "free"] = "held"
+    overrides: Path | None = None
 
 
 def _sources(options: ModelOptions) -> dict[str, Any]:
@@ -93,13 +96,16 @@ def reading(
                 "--calibration is for LDraw models; an assembly file gives its own stiffnesses"
             )
         if more is not None and more != ModelOptions():
-            raise UsageError("--library, --shadow, --gears and --inner are for LDraw models")
+            raise UsageError(
+                "--library, --shadow, --gears, --inner and --overrides are for LDraw models"
+            )
         return {}
     options: dict[str, Any] = {"axle_slide": axle_slide}
     more = more or ModelOptions()
     options |= _sources(more)
     options["gears"] = more.gears
     options["inner"] = more.inner
+    options["overrides"] = more.overrides
     if calibration is not None:
         from technic.assembly.stiffness import read_table
 

@@ -75,6 +75,7 @@ def load_ldraw(
     shadow: ShadowSource = None,
     gears: Gears = "off",
     inner: InnerMotion = "held",
+    overrides: str | Path | None = None,
 ) -> Assembly:
     """Read an LDraw model and find its connections.
 
@@ -95,6 +96,8 @@ def load_ldraw(
         Whether gears in mesh turn each other, or each by itself.
     inner : {"held", "free"}
         Whether motors and actuators hold their position or move freely.
+    overrides : path-like, optional
+        File of corrections to what is found; see `assembly.overrides`.
 
     Returns
     -------
@@ -127,7 +130,7 @@ def load_ldraw(
     joints, findings = connect(parts, table, axle_slide=axle_slide, inner=whole.joints)
     meshes = find_meshes(parts)
     coupled = mesh_joints(parts, meshes, joints, table) if gears == "on" else None
-    return Assembly(
+    assembly = Assembly(
         name=Path(document.main.name).stem,
         parts=parts,
         joints=joints + (coupled or ()),
@@ -141,6 +144,11 @@ def load_ldraw(
         source={"path": str(path), "sha256": document.sha256, "format": "ldraw"},
         imported=_summary(reading.parts, find, searched=library is not None),
     )
+    if overrides is None:
+        return assembly
+    from technic.assembly.overrides import apply_overrides, read_overrides
+
+    return apply_overrides(assembly, read_overrides(overrides), overrides)
 
 
 def lookup(library: LibrarySource = None, shadow: ShadowSource = None) -> PartFinder:

@@ -29,6 +29,7 @@ FINDING_WORDS = {
     FindingKind.LOOSE: ("loose part", "loose parts"),
     FindingKind.FLEXIBLE: ("flexible item, not modelled", "flexible items, not modelled"),
     FindingKind.INNER: ("part with inner motion", "parts with inner motion"),
+    FindingKind.OVERRIDE: ("correction of yours", "corrections of yours"),
     FindingKind.GEARS: ("pair of gears in mesh", "pairs of gears in mesh"),
     FindingKind.WARNING: ("warning", "warnings"),
 }
