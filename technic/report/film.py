@@ -10,6 +10,7 @@ import numpy as np
 from technic.errors import UsageError
 from technic.geometry import Array
 from technic.report.camera import View, fit, fixed_direction, view_direction
+from technic.report.carried import carried_twists
 from technic.report.deform import move_rigidly
 from technic.report.drawing import (
     Drawing,
@@ -59,8 +60,7 @@ def _motion(report: RigidityReport, drawing: Drawing) -> tuple[Poses, LegendItem
         return None
     first = motions[0]
     parts = report.assembly.parts
-    twists = np.zeros((len(parts), 6))
-    twists[list(first.parts)] = first.twists
+    twists = carried_twists(report.assembly, first)
     scale = _SWING * drawing.diagonal / max(furthest_way(report, drawing, twists), 1e-300)
 
     def poses(phase: float) -> tuple[Array, ...]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from technic.geometry import Array
+from technic.report.carried import carried_twists
 from technic.report.drawing import Drawing, deformation_scale
 from technic.report.html.bending import POWERS, bending_of
 from technic.report.html.shapes import Shapes
@@ -111,18 +112,18 @@ def mode_fields(report: RigidityReport, drawing: Drawing, shapes: Shapes) -> lis
 
 
 def _motion_field(motion: Motion, drawing: Drawing, shapes: Shapes) -> Field | None:
-    twists = np.zeros((len(drawing.assembly.parts), 6))
-    twists[list(motion.parts)] = motion.twists
+    twists = carried_twists(drawing.assembly, motion)
+    movers = tuple(int(k) for k in np.flatnonzero(np.any(twists != 0.0, axis=1)))
     furthest = _furthest(drawing, shapes, twists)
     angle = float(np.linalg.norm(twists[:, 3:], axis=1).max())
     if furthest == 0.0:
         return None
     if motion.kind in (MotionKind.SPINNING, MotionKind.IDLE) and motion.type is MotionType.ROTATION:
-        return Field(twists, 2.0 * np.pi / angle, turns=True, movers=motion.parts)
+        return Field(twists, 2.0 * np.pi / angle, turns=True, movers=movers)
     scale = _SWING * drawing.diagonal / furthest
     if angle * scale > _LARGEST_ANGLE:
         scale = _LARGEST_ANGLE / angle
-    return Field(twists, scale, movers=motion.parts)
+    return Field(twists, scale, movers=movers)
 
 
 def motion_fields(

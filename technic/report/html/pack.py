@@ -152,7 +152,7 @@ def _motions(
     found = []
     for n, (motion, movement) in enumerate(motion_fields(report, drawing, shapes)):
         entry = _field(block, movement)
-        entry["parts"] = block.add(list(motion.parts), "uint32")
+        entry["parts"] = block.add(list(movement.movers), "uint32")
         entry["kind"] = motion.kind.value
         entry["number"] = report.motions.index(motion)
         entry["words"] = motion_words(report, motion)
