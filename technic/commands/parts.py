@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from technic.commands.build_parts import build
 from technic.commands.options import JsonOption, QuietOption
 
 __all__ = ["app"]
@@ -19,6 +20,9 @@ app = typer.Typer(
     rich_markup_mode=None,
     no_args_is_help=True,
 )
+
+
+app.command("build")(build)
 
 
 @app.command("list")

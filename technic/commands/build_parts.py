@@ -1,0 +1,104 @@
+"""`technic parts build`: condense the solid models of parts into the file that is shipped."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from technic.commands.options import JsonOption, QuietOption
+
+__all__ = ["build"]
+
+
+def _target() -> Path:
+    """Return where the shipped file stands: in the source tree, beside the other part data."""
+    from importlib.resources import files
+
+    from technic.fem.solid.store import FILE
+
+    return Path(str(files("parts_library").joinpath(FILE)))
+
+
+def build(
+    numbers: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[ID]...", help="Parts to build; without any, all of them."),
+    ] = None,
+    cell: Annotated[
+        float, typer.Option("--cell", min=0.3, max=4.0, metavar="MM", help="Edge of a cell.")
+    ] = 0.8,
+    jobs: Annotated[int, typer.Option("--jobs", min=1, metavar="N", help="Processes.")] = 1,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="Where to; without it, the shipped file."),
+    ] = None,
+    json: JsonOption = None,
+    quiet: QuietOption = False,
+) -> None:
+    """Condense the solid model of each part onto its ports. Parts not named stay as they are."""
+    import os
+    import tempfile
+
+    from technic.errors import UsageError
+    from technic.fem.solid.grid import MeshSettings
+    from technic.fem.solid.store import build as build_all
+    from technic.fem.solid.store import has_solid_model, read, shape_key, write
+    from technic.parts.catalogue import catalogue
+    from technic.parts.shapes import is_approximate
+    from technic.report.json import STDOUT, write_json
+    from technic.units import MM
+
+    known = {d.id: d for d in catalogue()}
+    chosen = []
+    for number in numbers or known:
+        definition = catalogue().get(number)
+        if definition is None:
+            raise UsageError(f"no part {number!r} in the catalogue")
+        # a shape that is right in volume only says nothing about stiffness
+        if numbers or (has_solid_model(definition) and not is_approximate(definition)):
+            chosen.append(definition)
+    done = 0
+
+    def progress(part: str, failure: str | None) -> None:
+        nonlocal done
+        done += 1
+        if not quiet:
+            said = "" if failure is None else f": {failure}"
+            print(f"{done}/{len(chosen)} {part}{said}", file=sys.stderr, flush=True)
+
+    elements, failures = build_all(
+        chosen, MeshSettings(cell=cell * MM), jobs=jobs, progress=progress
+    )
+    target = out or _target()
+    built = set(elements)
+    if target.exists():
+        for part in known:
+            kept = None if part in built or part in failures else read(target, part)
+            if kept is not None:
+                elements[part] = kept
+    shapes = {part: shape_key(known[part]) for part in elements}
+    handle, name = tempfile.mkstemp(dir=target.parent, suffix=".zip")
+    os.close(handle)
+    try:
+        write(name, elements, shapes=shapes)
+        os.chmod(name, 0o644)
+        os.replace(name, target)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+    if json is not None:
+        figures = {
+            part: {
+                "cell_mm": element.cell / MM,
+                "ports": len(element.ports),
+                "condensation_error": element.condensation_error,
+            }
+            for part, element in sorted(elements.items())
+            if part in built
+        }
+        write_json({"schema": "technic-build/1", "built": figures, "failed": failures}, json)
+    if json != STDOUT and not quiet:
+        print(f"{len(built)} built, {len(failures)} failed, {len(elements)} in {target}")
