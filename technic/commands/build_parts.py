@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -67,7 +66,7 @@ def build(
         done += 1
         if not quiet:
             said = "" if failure is None else f": {failure}"
-            print(f"{done}/{len(chosen)} {part}{said}", file=sys.stderr, flush=True)
+            typer.echo(f"{done}/{len(chosen)} {part}{said}", err=True)
 
     elements, failures = build_all(
         chosen, MeshSettings(cell=cell * MM), jobs=jobs, progress=progress
@@ -101,4 +100,4 @@ def build(
         }
         write_json({"schema": "technic-build/1", "built": figures, "failed": failures}, json)
     if json != STDOUT and not quiet:
-        print(f"{len(built)} built, {len(failures)} failed, {len(elements)} in {target}")
+        typer.echo(f"{len(built)} built, {len(failures)} failed, {len(elements)} in {target}")
