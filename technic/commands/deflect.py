@@ -23,6 +23,8 @@ from technic.errors import UsageError
 if TYPE_CHECKING:
     from technic.assembly.model import Assembly
     from technic.geometry import Array
+    from technic.statics.solve import Load
+    from technic.system.assemble import Probe
 
 __all__ = ["deflect"]
 
@@ -100,12 +102,14 @@ def deflect(
     from technic.rigidity.analyze import FACTORIES
     from technic.statics.loads import GRAVITY, parse_hang, parse_load, parse_probe
     from technic.statics.solve import deflect as solve
+    from technic.system.part_models import models_of
 
     if not (load or hang or gravity):
         raise UsageError("nothing acts on the model; give --load, --hang or --gravity")
     if json is not None and json != STDOUT:
         check_writable(Path(json))
-    assembly = load_model(model, **reading(model, axle_slide, calibration))
+    how = reading(model, axle_slide, calibration)
+    assembly = load_model(model, **how)
     supports = tuple(parse_fix(assembly, text) for text in fix or ())
     assembly = replace(assembly, supports=assembly.supports + supports)
     way = _down(assembly, down, needed=bool(hang or gravity))
@@ -116,7 +120,16 @@ def deflect(
         weight = GRAVITY * way if gravity else None
     probes = tuple(parse_probe(assembly, text) for text in probe or ())
     answer = solve(assembly, tuple(loads), gravity=weight, probes=probes, element=FACTORIES[parts])
-    case = StaticCase(answer, tuple(loads), probes, weight)
+    intervals: tuple[tuple[float, float] | None, ...] = ()
+    if "table" in how:
+        from technic.statics.uncertainty import displacement_interval
+
+        points: tuple[Load | Probe, ...] = (*loads, *probes)
+        intervals = tuple(
+            displacement_interval(answer, points, k, how["table"], FACTORIES[parts])
+            for k in range(len(points))
+        )
+    case = StaticCase(answer, tuple(loads), probes, weight, intervals, models_of(assembly, parts))
     if json is not None:
         write_json(deflection_dict(case), json)
     if not quiet and json != STDOUT:

@@ -6,7 +6,8 @@ second, at the joint's point; reactions are those that the ground exerts on the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -44,17 +45,28 @@ class StaticCase:
         Further points asked for.
     gravity : (3,) ndarray or None
         Acceleration on all material (m/s2); None when the model's own weight is left out.
+    intervals : tuple of ((float, float) or None)
+        95 % interval (m) of how far each loaded or probed point goes; empty when nothing was measured.
+    part_models : mapping of str to int
+        How many parts were modelled as "solid", "frame" and "rigid".
     """
 
     deflection: Deflection
     loads: tuple[Load, ...]
     probes: tuple[Probe, ...] = ()
     gravity: Array | None = None
+    intervals: tuple[tuple[float, float] | None, ...] = ()
+    part_models: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def assembly(self) -> Assembly:
         """The assembly under load."""
         return self.deflection.system.assembly
+
+    def interval_mm(self, k: int) -> list[float] | None:
+        """Return the 95 % interval (mm) of how far the k-th point goes; None when it is not known."""
+        found = self.intervals[k] if self.intervals else None
+        return None if found is None else [found[0] / MM, found[1] / MM]
 
 
 def _vector(values: Array) -> list[float]:
@@ -81,6 +93,7 @@ def deflection_dict(case: StaticCase) -> dict[str, Any]:
             "joints": len(assembly.joints),
             "dof": answer.system.size,
             "mass_kg": answer.system.mass,
+            "part_models": dict(case.part_models),
             "unknown_parts": [
                 {"id": u.number, "count": u.count, "lines": list(u.lines)} for u in assembly.unknown
             ],
@@ -112,6 +125,8 @@ def deflection_dict(case: StaticCase) -> dict[str, Any]:
                 "point_mm": _vector(point.point / MM),
                 "displacement_mm": _vector(answer.probe_twists[k, :3] / MM),
                 "rotation_rad": _vector(answer.probe_twists[k, 3:]),
+                "distance_mm": float(np.linalg.norm(answer.probe_twists[k, :3])) / MM,
+                "distance_interval_95_mm": case.interval_mm(k),
             }
             for k, point in enumerate(points)
         ],
@@ -172,6 +187,13 @@ def _more(total: int) -> list[str]:
     return [f"     and {total - _SHOWN} more, see --json"] if total > _SHOWN else []
 
 
+def _sure(case: StaticCase, k: int) -> str:
+    interval = case.interval_mm(k)
+    if interval is None:
+        return ""
+    return f", {number(interval[0])} to {number(interval[1])} mm with 95 % confidence"
+
+
 def _loads(case: StaticCase, style: Style) -> list[str]:
     assembly, answer = case.assembly, case.deflection
     lines: list[str] = []
@@ -179,7 +201,7 @@ def _loads(case: StaticCase, style: Style) -> list[str]:
         lines += style.wrap(
             f"{_triple(load.force)} N on {part_name(assembly.parts[load.part], line=True)}"
             f"{' at ' + load.port if load.port else ''}: this point moves "
-            f"{_way(assembly, answer.probe_twists[k, :3])}.",
+            f"{_way(assembly, answer.probe_twists[k, :3])}{_sure(case, k)}.",
             " - ",
             "   ",
         )
@@ -190,7 +212,7 @@ def _loads(case: StaticCase, style: Style) -> list[str]:
         lines += style.wrap(
             f"Asked for: {part_name(assembly.parts[probe.part], line=True)}"
             f"{' at ' + probe.port if probe.port else ''} moves "
-            f"{_way(assembly, answer.probe_twists[k, :3])}.",
+            f"{_way(assembly, answer.probe_twists[k, :3])}{_sure(case, k)}.",
             " - ",
             "   ",
         )

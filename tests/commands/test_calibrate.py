@@ -107,10 +107,13 @@ def test_the_table_gives_the_analysis_an_interval(run, sample, tmp_path):
     assert "calibrated" in json.loads(out)["joint_stiffness"][0]["provenance"]
     _, out, _ = run("analyze", model, "--calibration", target)
     assert "with 95 % confidence" in out
-    code, out, _ = run(
-        "deflect", model, "--calibration", target, "--fix", "2:32316", "--hang", "3:32316:hole5:50g"
-    )
-    assert code == 0
+    loaded = ("deflect", model, "--fix", "2:32316", "--hang", "3:32316:hole5:50g")
+    _, out, _ = run(*loaded, "--calibration", target, "--json", "-")
+    (port,) = json.loads(out)["ports"]
+    low, high = port["distance_interval_95_mm"]
+    assert low < port["distance_mm"] < high
+    assert json.loads(run(*loaded, "--json", "-")[1])["ports"][0]["distance_interval_95_mm"] is None
+    assert "with 95 % confidence" in run(*loaded, "--calibration", target)[1]
 
 
 def test_template_can_be_built_filled_and_calibrated(run, tmp_path):
