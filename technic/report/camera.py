@@ -7,10 +7,11 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from technic.assembly.model import Assembly
 from technic.geometry import Array
 from technic.report.scene import Camera
 
-__all__ = ["VIEWS", "View", "fit", "fixed_direction", "view_direction"]
+__all__ = ["VIEWS", "View", "fit", "fixed_direction", "model_axes", "view_direction"]
 
 View = Literal["iso", "front", "side", "top", "mode"]
 """Names of views; `mode` is the one that shows the worst mode best."""
@@ -84,9 +85,25 @@ def view_direction(points: Array, movement: Array | None = None, aspect: float =
     return views[0] if shown[0] >= _USUAL * max(shown) else views[int(np.argmax(shown))]
 
 
-def fit(points: Array, toward: Array) -> Camera:
-    """Return the camera, looking from the direction `toward`, that just sees all points (n, 3)."""
-    camera = Camera(toward, np.array([0.0, -1.0, 0.0]), points[0], 1.0, 1.0)
+def model_axes(assembly: Assembly) -> Array:
+    """Return the matrix from LDraw's axes (x right, y down, z away) to those of a model, (3, 3).
+
+    In an assembly file y is up when it is two-dimensional, z when it is three-dimensional.
+    """
+    if assembly.source.get("format") != "assembly":
+        return np.eye(3)
+    if assembly.dimension == 2:
+        return np.diag([1.0, -1.0, -1.0])
+    return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+
+
+def fit(points: Array, toward: Array, up: Array | None = None) -> Camera:
+    """Return the camera, looking from the direction `toward`, that just sees all points (n, 3).
+
+    `up` is LDraw's, -y, unless given.
+    """
+    upright = np.array([0.0, -1.0, 0.0]) if up is None else up
+    camera = Camera(toward, upright, points[0], 1.0, 1.0)
     axes = camera.axes()
     seen = points @ axes.T
     low, high = seen.min(axis=0), seen.max(axis=0)

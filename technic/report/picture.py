@@ -11,7 +11,7 @@ import numpy as np
 from technic.geometry import Array
 from technic.parts.definition import PartDefinition
 from technic.report.arrows import arrow
-from technic.report.camera import View, fit, fixed_direction, view_direction
+from technic.report.camera import View, fit, fixed_direction, model_axes, view_direction
 from technic.report.drawing import (
     Drawing,
     deformation_scale,
@@ -136,7 +136,7 @@ def headline(report: RigidityReport) -> tuple[str, str]:
 
 
 def _elastic_panel(
-    report: RigidityReport, drawing: Drawing, field: WorstField, toward: Array
+    report: RigidityReport, drawing: Drawing, field: WorstField, sight: tuple[Array, Array]
 ) -> tuple[Panel, list[LegendItem]] | None:
     load = unit_load(report)
     if load is None:
@@ -155,7 +155,7 @@ def _elastic_panel(
         f"How it gives way (deformation x {scale:g})",
         surfaces,
         (edges, outline(drawing, drawing.points)),
-        fit(extent, toward),
+        fit(extent, *sight),
         _spot_markers(report, moved),
     )
     legend = [
@@ -206,24 +206,32 @@ def report_scene(
     moving = motion_layers(report, drawing.points, drawing.solids, drawing.diagonal)
     side_by_side = moving is not None and field is not None
     toward = fixed_direction(view)
+    axes = model_axes(report.assembly)
+    if report.assembly.dimension == 2:
+        toward = fixed_direction("front")  # a plane model is looked at square on
     if toward is None:
         aspect = _HALF_ASPECT if side_by_side else _WHOLE_ASPECT
-        toward = view_direction(np.concatenate(drawing.points), movement, aspect)
+        seen = None if movement is None else movement @ axes
+        toward = view_direction(np.concatenate(drawing.points) @ axes, seen, aspect)
+    toward = axes @ toward
+    up = axes @ np.array([0.0, -1.0, 0.0])
     panels: list[Panel] = []
     legend: list[LegendItem] = []
     if moving is not None:
         body, edges = model_layers(drawing, drawing.points, pale=0.25)
         surfaces = (body, *moving.surfaces)
         extent = np.concatenate([s.points for s in surfaces] + [moving.lines.points])
-        panels.append(Panel(moving.caption, surfaces, (edges, moving.lines), fit(extent, toward)))
+        panels.append(
+            Panel(moving.caption, surfaces, (edges, moving.lines), fit(extent, toward, up))
+        )
         legend += [LegendItem("arrow", MOTION_COLOR, text) for text in moving.legend]
-    elastic = None if field is None else _elastic_panel(report, drawing, field, toward)
+    elastic = None if field is None else _elastic_panel(report, drawing, field, (toward, up))
     if elastic is not None:
         panels.append(elastic[0])
         legend += elastic[1]
     if not panels:
         body, edges = model_layers(drawing, drawing.points)
-        panels.append(Panel("", (body,), (edges,), fit(body.points, toward)))
+        panels.append(Panel("", (body,), (edges,), fit(body.points, toward, up)))
     stand_ins = sum(solid.stand_in for solid in drawing.solids)
     if stand_ins:
         legend.append(

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from technic.assembly.model import Part
 from technic.geometry import Array
-from technic.parts.definition import FrameBody, PartDefinition
+from technic.parts.definition import (
+    FrameBody,
+    MeshBody,
+    PartDefinition,
+    PlateBody,
+    TrussBody,
+)
 from technic.report.arrows import tube
 from technic.report.palette import NEUTRAL
 from technic.report.scene import Faces, Surface, merge
@@ -84,6 +91,9 @@ def _tubes(part: Part | PartDefinition) -> Surface:
         for (a, b), section in zip(body.members, body.sections, strict=True):
             radius = float(np.sqrt(section.area / np.pi))
             pieces.append(tube(body.points[a], body.points[b], radius, NEUTRAL))
+    if isinstance(body, TrussBody):
+        p, q = body.points
+        pieces.append(tube(p, q, float(np.sqrt(body.area / np.pi)), NEUTRAL))
     for port in part.ports:
         half = 0.5 * max(port.length, _PORT_RADIUS) * port.axis
         pieces.append(tube(port.position - half, port.position + half, _PORT_RADIUS, NEUTRAL))
@@ -97,6 +107,29 @@ def _tubes(part: Part | PartDefinition) -> Surface:
     return merge(pieces)
 
 
+def _skin(body: PlateBody | MeshBody) -> Solid:
+    """Return the surface of a plate, both sides of it, or of a body of tetrahedra."""
+    if isinstance(body, PlateBody):
+        from technic.fem.plate import divide
+
+        points, cells = divide(body.outline, body.size)
+    else:
+        points, cells = np.asarray(body.points), body.cells
+    sides = list(combinations(range(cells.shape[1]), cells.shape[1] - 1))
+    owned = cells[:, sides].reshape(-1, cells.shape[1] - 1)
+    _, first, times = np.unique(
+        np.sort(owned, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    outer = owned[first[times == 1]]
+    if cells.shape[1] == 3:  # the outline's edges become walls between front and back
+        n, half = len(points), np.array([0.0, 0.0, body.thickness / 2.0])
+        a, b = outer.T
+        walls = np.concatenate([np.column_stack([a, b, b + n]), np.column_stack([a, b + n, a + n])])
+        outer = np.concatenate([cells, cells[:, ::-1] + n, walls])
+        points = np.concatenate([points + half, points - half])
+    return Solid(points, outer, sharp_edges(points, outer))
+
+
 def _build(part: Part | PartDefinition, definition: PartDefinition | None) -> Solid:
     if definition is not None:
         from technic.parts import shapes
@@ -106,6 +139,8 @@ def _build(part: Part | PartDefinition, definition: PartDefinition | None) -> So
             points = np.asarray(shape.vertices, dtype=float)
             faces = np.asarray(shape.faces, dtype=np.int64)
             return Solid(points, faces, sharp_edges(points, faces))
+    if isinstance(part.body, PlateBody | MeshBody):
+        return _skin(part.body)
     stand_in = _tubes(part)
     edges = sharp_edges(stand_in.points, stand_in.faces)
     return Solid(stand_in.points, stand_in.faces, edges, stand_in=True)
