@@ -128,7 +128,7 @@ def test_policy_stops_what_is_not_ours(visit, pair: RigidityReport) -> None:
           const script = document.createElement("script");
           script.textContent = "window.foreign = 1";
           const picture = document.createElement("img");
-          picture.src = "https://example.invalid/picture.png";
+          picture.src = "https://example.org/picture.png";
           document.body.append(script, picture);
         }"""
     )
