@@ -78,7 +78,9 @@ def eigenvalue_gradients(
         _add_members(slopes, group, nodes, full, values, matrices.mass)
     _add_trusses(slopes, model, positions, full, values, matrices.mass)
     _add_links(slopes, model, positions, full, _forces(model, matrices, values, vectors))
-    for out, total in zip(slopes.vertices, zip(slopes.nodes, slopes.points, strict=True), strict=True):
+    for out, total in zip(
+        slopes.vertices, zip(slopes.nodes, slopes.points, strict=True), strict=True
+    ):
         out += model.nodes.T @ total[0] + model.geometry.link_points.T @ total[1]
     return slopes.vertices
 
@@ -150,7 +152,9 @@ def _forces(model: Model, matrices: Matrices, values: Array, vectors: Array) -> 
         gram = sparse.csc_array(rigid @ rigid.T)
         # rows may depend on each other: any of the forces that balance will do
         soft = 1e-10 * float(gram.diagonal().max())
-        solve = sparse_linalg.splu(sparse.csc_array(gram + soft * sparse.eye_array(gram.shape[0]))).solve
+        solve = sparse_linalg.splu(
+            sparse.csc_array(gram + soft * sparse.eye_array(gram.shape[0]))
+        ).solve
         held = np.zeros((rigid.shape[0], len(values)))
         for _ in range(3):
             held += solve(rigid @ (rest - rigid.T @ held))

@@ -468,9 +468,7 @@ def moved(model: Model, positions: Array) -> Assembly:
         parts[p] = replace(parts[p], body=new, mass_properties=made.mass_properties, shape=shape)
     at = geometry.link_points @ positions
     axes = model.axes(positions)
-    joints = tuple(
-        replace(j, point=at[k], axes=axes[k]) for k, j in enumerate(assembly.joints)
-    )
+    joints = tuple(replace(j, point=at[k], axes=axes[k]) for k, j in enumerate(assembly.joints))
     supports = tuple(
         s if s.point is None else Support(s.part, at[len(joints) + k], s.held)
         for k, s in enumerate(assembly.supports)
