@@ -29,6 +29,10 @@ def calibrate(
         ),
     ] = None,
     json: JsonOption = None,
+    report: Annotated[
+        Path | None,
+        typer.Option("--report", metavar="HTML", help="Write a page with plots of the fit."),
+    ] = None,
     template: Annotated[
         Path | None,
         typer.Option(
@@ -59,7 +63,7 @@ def calibrate(
     from technic.report.json import STDOUT
 
     if template is not None:
-        if readings is not None or out is not None or json is not None:
+        if any(x is not None for x in (readings, out, json, report)):
             raise UsageError("--template stands alone: fill the table in, then calibrate with it")
         from technic.report.calibration_template import write_template
 
@@ -69,7 +73,7 @@ def calibrate(
         return
     if readings is None:
         raise UsageError("name the CSV file with the readings, or use --template DIR to get one")
-    for target in (out, None if json in (None, STDOUT) else Path(str(json))):
+    for target in (out, report, None if json in (None, STDOUT) else Path(str(json))):
         if target is not None:
             check_writable(target)
     result = _solve(readings, rigs, base, robust=robust, no_offsets=no_offsets, parts=parts)
@@ -82,6 +86,11 @@ def calibrate(
 
         table = calibration_toml(result, datetime.now(UTC).date().isoformat())
         write_atomic(out, lambda path: _write(path, table))
+    if report is not None:
+        from technic.report.calibration_page import calibration_page
+
+        page = calibration_page(result)
+        write_atomic(report, lambda path: _write(path, page))
     if json is not None:
         write_json(calibration_dict(result), json)
     if not quiet and json != STDOUT:

@@ -191,7 +191,8 @@ def _sure(case: StaticCase, k: int) -> str:
     interval = case.interval_mm(k)
     if interval is None:
         return ""
-    return f", {number(interval[0])} to {number(interval[1])} mm with 95 % confidence"
+    low, high = (number(value) for value in interval)
+    return f"; the measured joints alone leave {low} to {high} mm with 95 % confidence"
 
 
 def _loads(case: StaticCase, style: Style) -> list[str]:

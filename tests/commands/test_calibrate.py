@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import tomllib
+from html.parser import HTMLParser
 
 import pytest
 
@@ -114,6 +115,20 @@ def test_the_table_gives_the_analysis_an_interval(run, sample, tmp_path):
     assert low < port["distance_mm"] < high
     assert json.loads(run(*loaded, "--json", "-")[1])["ports"][0]["distance_interval_95_mm"] is None
     assert "with 95 % confidence" in run(*loaded, "--calibration", target)[1]
+
+
+def test_page_shows_every_reading_and_asks_for_nothing_from_outside(run, sample, tmp_path):
+    page = tmp_path / "fit.html"
+    assert run("calibrate", sample("one_pose_synthetic.csv"), "--report", page, "-q")[0] == 0
+    text = page.read_text(encoding="utf-8")
+    assert text.count("<svg") == 3
+    assert text.count("<circle") == 3 * 27
+    assert "not identifiable" in text
+    assert "one pose only" in text
+    assert "SYNTHETIC" in text
+    assert "http" not in text
+    assert "nan" not in text
+    HTMLParser().feed(text)
 
 
 def test_template_can_be_built_filled_and_calibrated(run, tmp_path):
