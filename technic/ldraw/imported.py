@@ -18,6 +18,7 @@ from technic.ldraw.primitives import ports_from_primitives
 from technic.ldraw.shadow import ShadowLibrary
 from technic.ldraw.shadow_ports import ports_from_shadow
 from technic.ldraw.triangles import Surface, surface_of
+from technic.ldraw.undersides import stud_places
 from technic.parts.definition import MassProperties, PartDefinition, Port, PortKind, RigidBody
 from technic.parts.materials import material
 from technic.units import PITCH
@@ -71,6 +72,11 @@ def definition_from_library(
     if ports is None:
         ports = ports_from_primitives(library, number) or ()
         origin = "ports from LDraw primitives"
+        if not any(port.kind in (PortKind.TUBE, PortKind.PIN, PortKind.AXLE) for port in ports):
+            places = stud_places(surface)
+            if places:
+                ports = (*ports, *places)
+                origin += ", places for studs from its open underside"
     title = _title(library.file(resolved.key).title)
     mass, measured = mass_of(surface)
     return PartDefinition(
