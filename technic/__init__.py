@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from technic.assembly.builder import Linkage
     from technic.assembly.model import Assembly
+    from technic.design.optimize.solve import optimize
     from technic.design.suggest import suggest
     from technic.errors import TechnicError
     from technic.loading import load, save
@@ -37,6 +38,7 @@ _HOMES = {
     "assemble": "technic.system.assemble",
     "calibrate": "technic.statics.calibration",
     "load": "technic.loading",
+    "optimize": "technic.design.optimize.solve",
     "suggest": "technic.design.suggest",
     "save": "technic.loading",
 }
@@ -53,6 +55,7 @@ __all__ = [
     "assemble",
     "calibrate",
     "load",
+    "optimize",
     "save",
     "suggest",
 ]

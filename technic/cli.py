@@ -16,7 +16,17 @@ from typing import Annotated
 import typer
 
 from technic import __version__
-from technic.commands import analyze, calibrate, deflect, demo, doctor, paper, parts, suggest
+from technic.commands import (
+    analyze,
+    calibrate,
+    deflect,
+    demo,
+    doctor,
+    optimize,
+    paper,
+    parts,
+    suggest,
+)
 from technic.errors import TechnicError
 
 __all__ = ["app", "main"]
@@ -37,6 +47,7 @@ app.command("calibrate")(calibrate.calibrate)
 app.command("demo")(demo.demo)
 app.command("doctor")(doctor.doctor)
 app.command("suggest")(suggest.suggest)
+app.command("optimize")(optimize.optimize)
 app.command("paper")(paper.paper)
 app.add_typer(parts.app, name="parts")
 

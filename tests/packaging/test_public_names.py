@@ -20,6 +20,7 @@ PUBLIC = [
     "assemble",
     "calibrate",
     "load",
+    "optimize",
     "save",
     "suggest",
 ]

@@ -1,0 +1,81 @@
+"""A linkage before and after, drawn with plain lines: same scale, same frame, the vertices' path between."""
+
+from __future__ import annotations
+
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from technic.design.optimize.solve import Optimization
+from technic.geometry import Array
+from technic.report.wording import number
+
+__all__ = ["comparison_svg"]
+
+WIDTH = 900.0
+"""Of the picture (px)."""
+
+MARGIN = 40.0
+
+BEFORE, AFTER, PATH, INK = "#9aa5b1", "#0b6e99", "#c2571a", "#1f2933"
+
+
+def comparison_svg(found: Optimization) -> str:
+    """Return an SVG picture.
+
+    Linkages in space are seen along the direction in which they are thinnest.
+    """
+    steps = np.array([step.positions for step in found.history])
+    eye = _eye(found.geometry.positions, found.before.dimension)
+    flat = steps @ eye.T
+    low, high = flat.reshape(-1, 2).min(axis=0), flat.reshape(-1, 2).max(axis=0)
+    scale = (WIDTH - 2 * MARGIN) / max(float((high - low).max()), 1e-12)
+    height = 2 * MARGIN + 30.0 + scale * float(high[1] - low[1])
+
+    def at(points: Array) -> Array:
+        x = MARGIN + scale * (points[..., 0] - low[0])
+        y = MARGIN + scale * (high[1] - points[..., 1])
+        return np.stack([x, y], axis=-1)
+
+    places = at(flat)
+    thick = max(2.0, 0.6 * scale * 0.003)
+    out = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH:.0f}" height="{height:.0f}" '
+        f'viewBox="0 0 {WIDTH:.0f} {height:.0f}" font-family="sans-serif" font-size="14">',
+        f"<title>{escape(found.before.name)}: before and after</title>",
+        f'<rect width="{WIDTH:.0f}" height="{height:.0f}" fill="white"/>',
+    ]
+    for which, color, dash in ((0, BEFORE, ' stroke-dasharray="7 5"'), (-1, AFTER, "")):
+        for own in found.geometry.corners.values():
+            line = " ".join(f"{x:.2f},{y:.2f}" for x, y in places[which][list(own)])
+            out.append(
+                f'<polyline points="{line}" fill="none" stroke="{color}" '
+                f'stroke-width="{thick:.1f}" stroke-linecap="round"{dash}/>'
+            )
+    used = sorted({v for own in found.geometry.corners.values() for v in own})
+    for v in used:
+        line = " ".join(f"{x:.2f},{y:.2f}" for x, y in places[:, v])
+        out.append(
+            f'<polyline points="{line}" fill="none" stroke="{PATH}" stroke-width="1.2" opacity="0.8"/>'
+        )
+        x, y = places[-1, v]
+        fill = INK if v in found.geometry.pinned else "white"
+        out.append(f'<circle cx="{x:.2f}" cy="{y:.2f}" r="4" fill="{fill}" stroke="{INK}"/>')
+        name = escape(found.geometry.names[v])
+        out.append(f'<text x="{x + 6:.1f}" y="{y - 6:.1f}" fill="{INK}" font-size="11">{name}</text>')
+    said = (
+        f"dashed: before, {number(found.start.rigidity)} N/m; solid: after, "
+        f"{number(found.end.rigidity)} N/m ({number(found.factor)} times)"
+    )
+    out += [f'<text x="{MARGIN}" y="{height - 14:.1f}" fill="{INK}">{said}</text>', "</svg>"]
+    return "\n".join(out) + "\n"
+
+
+def _eye(positions: Array, dimension: int) -> Array:
+    """Return the two directions of the picture, (2, 3)."""
+    if dimension == 2:
+        return np.eye(3)[:2]
+    _, _, axes = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=False)
+    axes = axes[:2] * np.where(np.take_along_axis(
+        axes[:2], np.argmax(np.abs(axes[:2]), axis=1)[:, None], axis=1) < 0, -1.0, 1.0)
+    return np.asarray(axes)
