@@ -17,10 +17,14 @@ from technic.ldraw.matching import Limits
 from technic.parts.definition import PortKind
 from technic.units import PITCH
 
-__all__ = ["TURNTABLE", "TYRE", "Seat", "seats"]
+__all__ = ["PLANET", "TURNTABLE", "TYRE", "Seat", "seats"]
 
 TYRE = "tyre/rim"
 TURNTABLE = "turntable/turntable"
+PLANET = "planet/differential"
+
+PLANET_REACH = PITCH
+"""Furthest that a planet gear is from the middle of its casing along its own shaft (m)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +82,43 @@ def seats(parts: Sequence[Part], limits: Limits) -> list[Seat]:
         if best is not None:
             taken.update(best.parts)
             found.append(best)
+    found += _planets(parts, limits)
     return sorted(found, key=lambda seat: seat.parts)
+
+
+def _planets(parts: Sequence[Part], limits: Limits) -> list[Seat]:
+    """Return the gears on the stubs inside of differentials.
+
+    Such a gear has its bore across the casing's axis and on it; gears on the axles have theirs along.
+    """
+    casings = [k for k, part in enumerate(parts) if _is(part, "differential")]
+    gears = [k for k, part in enumerate(parts) if _is(part, "gear")] if casings else []
+    found = []
+    for casing in casings:
+        line = _bore(parts[casing])
+        if line is None:
+            continue
+        axis = line[1]
+        foot = next(
+            parts[casing].pose.points(port.position)
+            for port in parts[casing].ports
+            if port.kind in (PortKind.PIN_HOLE, PortKind.AXLE_HOLE)
+        )
+        middle = foot + ((parts[casing].centroid - foot) @ axis) * axis
+        for gear in gears:
+            shaft = _bore(parts[gear])
+            if shaft is None or abs(float(shaft[1] @ axis)) > np.sin(limits.angle):
+                continue
+            between = middle - shaft[0]
+            along = float(between @ shaft[1])
+            miss = between - along * shaft[1]
+            # the stubs cross the axis somewhere in the casing, not always at its centre of mass
+            offset = float(np.linalg.norm(miss - (miss @ axis) * axis))
+            near = max(abs(along), abs(float(miss @ axis))) <= PLANET_REACH
+            if near and offset <= limits.offset:
+                pair = (min(casing, gear), max(casing, gear))
+                found.append(Seat(PLANET, pair, shaft[0], shaft[1], offset))
+    return found
 
 
 def _is(part: Part, what: str) -> bool:

@@ -12,11 +12,11 @@ from technic.assembly.stiffness import MOTIONS, default_table, read_table
 from technic.errors import InputError, SchemaError, UsageError
 from technic.ldraw.gears import CONNECTION as GEARS
 from technic.ldraw.matching import MATES
-from technic.ldraw.seats import TURNTABLE, TYRE
+from technic.ldraw.seats import PLANET, TURNTABLE, TYRE
 
 
 def test_every_connection_has_an_entry():
-    assert {*MATES.values(), TYRE, TURNTABLE, GEARS} == set(default_table().connections)
+    assert {*MATES.values(), TYRE, TURNTABLE, PLANET, GEARS} == set(default_table().connections)
 
 
 def test_pin_has_the_papers_values():

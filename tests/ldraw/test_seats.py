@@ -81,3 +81,32 @@ def test_the_halves_of_a_turntable_turn():
 
 def test_two_equal_halves_are_no_turntable():
     assert not joints_of([place(half("99009"), [0, 0, 0]), place(half("99009"), [0, 0, 0])])
+
+
+# --- differentials ------------------------------------------------------------------------------
+def casing():
+    """Return a differential's casing about z, with bores at its ends."""
+    ends = [port(f"end{k}", "pin_hole", [0, 0, z], Z, 10) for k, z in enumerate((-25, 25))]
+    return replace(define("62821", "Differential", ends), family="differential")
+
+
+def planet():
+    """Return a gear about z."""
+    return define("6589", "Gear 12 Tooth Bevel", [port("hole", "axle_hole", [0, 0, 0], Z, 10)])
+
+
+@pytest.mark.parametrize("side", [-12, 12])
+def test_planet_gears_turn_on_the_stubs_of_their_casing(side):
+    parts = [place(casing(), (0, 0, 0)), place(planet(), (side, 0, 0), turn("z", "x"))]
+    (joint,) = joints_of(parts)
+    assert joint.connection == "planet/differential"
+    assert joint.type is JointType.HINGE
+    assert abs(joint.axes[0] @ [1, 0, 0]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("at", "along"),
+    [((0, 0, 12), "z"), ((12, 6, 0), "x"), ((60, 0, 0), "x"), ((12, 0, 40), "x")],
+)
+def test_gears_elsewhere_are_no_planets(at, along):
+    assert joints_of([place(casing(), (0, 0, 0)), place(planet(), at, turn("z", along))]) == ()

@@ -1,0 +1,112 @@
+"""All shared models with the parts library: nothing unknown, all of it joined, the known counts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+
+from technic.assembly.model import Assembly, FindingKind
+from technic.groups import connected_groups
+from technic.ldraw.library import Library
+from technic.ldraw.reader import load_ldraw
+from technic.ldraw.shadow import ShadowLibrary
+from technic.rigidity.kinematics import component_motions, kinematics
+
+pytestmark = pytest.mark.slow
+
+LIBRARY = "ldraw-technic-2026-02.zip"
+SHADOW = "ldcad-shadow-2026-03.zip"
+
+ALL = (
+    "cube7.ldr",
+    "cube9_simple.ldr",
+    "fll_robot.mpd",
+    "hinged_L.ldr",
+    "omr_10212_imperial_shuttle.mpd",
+    "omr_31066_rover.mpd",
+    "omr_42004_mini_backhoe.mpd",
+    "omr_42020_twin_rotor.mpd",
+    "omr_8002_destroyer_droid.mpd",
+    "square.ldr",
+    "trapezoid.ldr",
+    "triangle.ldr",
+)
+
+REASONS = ("nothing there", "misses the hole", "is already taken")
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Motions in all, and the share of the parts in the biggest piece."""
+
+    total: int
+    main: float
+
+
+# README of the shared models, but for omr_42004: 65 there. Three of our four further motions are single
+# studs, which may turn here and are fixed there; one is the bucket's click hinge, which has no connector.
+EXPECTED = {
+    "omr_42020_twin_rotor.mpd": Counts(33, 0.99),
+    "omr_42004_mini_backhoe.mpd": Counts(69, 0.99),
+    "fll_robot.mpd": Counts(97, 1.0),
+}
+
+# The biggest piece of the models of System parts holds 89, 97 and 80 % there, a percent of which is
+# figures whose limbs no connector holds.
+MAIN = {
+    "omr_31066_rover.mpd": 0.87,
+    "omr_8002_destroyer_droid.mpd": 0.97,
+    "omr_10212_imperial_shuttle.mpd": 0.80,
+}
+
+
+@pytest.fixture(scope="module")
+def library(shared) -> Library:
+    return Library.open(shared / "ldraw" / LIBRARY)
+
+
+def main_share(assembly: Assembly) -> float:
+    groups = connected_groups(range(len(assembly.parts)), (j.parts for j in assembly.joints))
+    return max(len(group) for group in groups) / len(assembly.parts)
+
+
+def total(assembly: Assembly) -> int:
+    kin = kinematics(assembly)
+    return sum(component_motions(kin, c).internal for c in range(len(kin.components)))
+
+
+@pytest.mark.parametrize("with_shadow", [False, True], ids=["primitives", "shadow"])
+@pytest.mark.parametrize("name", ALL)
+def test_nothing_is_unknown_but_what_the_model_draws(model, library, shared, name, with_shadow):
+    shadow = ShadowLibrary.open(shared / "ldraw" / SHADOW) if with_shadow else None
+    assembly = load_ldraw(model(name), library=library, shadow=shadow)
+    for unknown in assembly.unknown:
+        assert "drawn in the file" in unknown.reason, unknown
+    ends = [
+        f for f in assembly.findings if f.kind in (FindingKind.OPEN_PORT, FindingKind.NEAR_MISS)
+    ]
+    assert all(any(reason in f.message for reason in REASONS) for f in ends)
+    imported = assembly.imported
+    assert imported is not None
+    read = sum(part.count for part in imported.from_library)
+    assert imported.catalogue + read == len(assembly.parts)
+    if name in MAIN:
+        assert main_share(assembly) >= MAIN[name]
+
+
+@pytest.mark.parametrize("name", sorted(EXPECTED))
+@pytest.mark.parametrize("use", [False, True], ids=["without", "with"])
+def test_counts_of_the_official_models(model, library, name, use):
+    assembly = load_ldraw(model(name), library=library if use else None)
+    assert total(assembly) == EXPECTED[name].total
+    assert main_share(assembly) >= EXPECTED[name].main
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_models_run_without_a_library(model, name):
+    assembly = load_ldraw(model(name))
+    assert assembly.parts
+    assert assembly.imported is not None
+    assert not assembly.imported.library
+    assert not assembly.imported.from_library
