@@ -39,8 +39,8 @@ _HOMES = {
     "calibrate": "technic.statics.calibration",
     "load": "technic.loading",
     "optimize": "technic.design.optimize.solve",
-    "suggest": "technic.design.suggest",
     "save": "technic.loading",
+    "suggest": "technic.design.suggest",
 }
 """Where each public name lives."""
 

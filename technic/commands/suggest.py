@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from technic.commands.options import AxleSlideOption, CalibrationOption, JsonOption, QuietOption
+from technic.commands.options import (
+    AxleSlideOption,
+    CalibrationOption,
+    JsonOption,
+    PictureOption,
+    QuietOption,
+)
 from technic.commands.reading import reading
 from technic.errors import UsageError
 
@@ -106,6 +112,26 @@ def _changes(chosen: Sequence[Suggestion], *, pair: bool) -> list[Change]:
     return changes
 
 
+def _draw(
+    answers: Sequence[Suggestions], chosen: Sequence[Suggestion], picture: Path, *, pair: bool
+) -> None:
+    """Draw the model before and after what is applied, or after the best suggestion."""
+    from technic.report.render import Painter
+    from technic.report.suggest_picture import before_after_scene
+
+    last = chosen[-1] if chosen else None
+    for answer in answers if last is None else ():
+        last = answer.suggestions[0] if answer.suggestions else last
+    if last is None:
+        raise UsageError("there is no suggestion to draw")
+    after = last.pair.report if pair and last.pair is not None else last.report
+    painter = Painter()
+    try:
+        painter.draw(before_after_scene(answers[0].before, after), picture)
+    finally:
+        painter.close()
+
+
 def suggest(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="LDraw file (.ldr, .mpd).")],
     json: JsonOption = None,
@@ -172,6 +198,7 @@ def suggest(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Where --apply writes.")
     ] = None,
+    picture: PictureOption = None,
     parts_list: Annotated[
         Path | None,
         typer.Option(
@@ -200,7 +227,7 @@ def suggest(
 
     if (apply is None) != (out is None):
         raise UsageError("--apply RANK and --out FILE go together")
-    for path in (out, parts_list, Path(json) if json not in (None, STDOUT) else None):
+    for path in (out, picture, parts_list, Path(json) if json not in (None, STDOUT) else None):
         if path is not None:
             check_writable(path)
     if model.suffix.lower() == ".json":
@@ -253,6 +280,8 @@ def suggest(
         sys.stdout.flush()
     if out is not None:
         write_reinforced(model, out, assembly, _changes(chosen, pair=pair))
+    if picture is not None:
+        _draw(answers, chosen, picture, pair=pair)
     if parts_list is not None:
         every = [s for a in answers for s in (a.suggestions if sequence else a.suggestions[:1])]
         total: Counter[str] = Counter()

@@ -25,7 +25,15 @@ from technic.parts.definition import PartDefinition, PortKind
 from technic.parts.shapes import has_shape, mesh
 from technic.units import LDU
 
-__all__ = ["PLAY", "Surroundings", "overlap", "pin_length", "push_side", "solid_overlaps"]
+__all__ = [
+    "PLAY",
+    "Surroundings",
+    "overlap",
+    "pin_length",
+    "push_side",
+    "solid_overlaps",
+    "surface_within",
+]
 
 PLAY: Final = 0.1e-3
 """New parts are tested this much smaller on every face (m): LEGO beams are 7.8 mm wide in a grid of 8
@@ -40,7 +48,7 @@ give."""
 
 
 @lru_cache(maxsize=256)
-def _shrunk(definition: PartDefinition, play: float) -> trimesh.Trimesh:
+def surface_within(definition: PartDefinition, play: float) -> trimesh.Trimesh:
     """Return a part's surface with every face moved inwards by `play`."""
     whole = mesh(definition)
     out = whole.copy()
@@ -61,7 +69,7 @@ def _shrunk(definition: PartDefinition, play: float) -> trimesh.Trimesh:
 
 @lru_cache(maxsize=512)
 def _geometry(definition: PartDefinition, play: float) -> Any:
-    surface = mesh(definition) if play == 0.0 else _shrunk(definition, play)
+    surface = mesh(definition) if play == 0.0 else surface_within(definition, play)
     model = fcl.BVHModel()
     model.beginModel(len(surface.vertices), len(surface.faces))
     model.addSubModel(surface.vertices, surface.faces)
@@ -194,7 +202,7 @@ def push_side(
 
 @lru_cache(maxsize=256)
 def _solid(definition: PartDefinition, play: float) -> Any:
-    surface = mesh(definition) if play == 0.0 else _shrunk(definition, play)
+    surface = mesh(definition) if play == 0.0 else surface_within(definition, play)
     return manifold3d.Manifold(
         manifold3d.Mesh64(
             vert_properties=np.asarray(surface.vertices) / LDU,

@@ -21,7 +21,7 @@ from technic.geometry import Array, readonly, shift_twist
 from technic.parts.catalogue import catalogue
 from technic.parts.definition import PartDefinition
 
-__all__ = ["Condensed", "Hold", "condensed", "hold_of"]
+__all__ = ["Condensed", "Hold", "condensed", "hold_of", "own_modes"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +117,30 @@ def _spring(pin: tuple[float, ...], *, spin: bool = False) -> Array:
     return single
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Matrices:
+    """A beam and its new pins before condensation.
+
+    Parameters
+    ----------
+    own, inertia : (n, n) ndarray
+        Stiffness, springs at the places included, and inertia of their own unknowns.
+    cross : (n, 6 places) ndarray
+        Stiffness between their unknowns and the places.
+    outer, heavy : (6 places, 6 places) ndarray
+        Stiffness and inertia at the places alone.
+    mass : float
+        (kg)
+    """
+
+    own: Array
+    inertia: Array
+    cross: Array
+    outer: Array
+    heavy: Array
+    mass: float
+
+
 @lru_cache(maxsize=4096)
 def condensed(number: str, holds: tuple[Hold, ...], pin: tuple[float, ...]) -> Condensed:
     """Return a beam and its new pins, condensed.
@@ -135,6 +159,36 @@ def condensed(number: str, holds: tuple[Hold, ...], pin: tuple[float, ...]) -> C
         Places in the order of `holds`: each hole that a new pin enters, or the hole of the beam for
         the movement of a pin that is there already.
     """
+    m = _matrices(number, holds, pin)
+    follow = -linalg.solve(m.own, m.cross, assume_a="pos")
+    stiffness = m.outer + m.cross.T @ follow
+    inertia = m.heavy + follow.T @ m.inertia @ follow
+    return Condensed((stiffness + stiffness.T) / 2, (inertia + inertia.T) / 2, m.mass)
+
+
+@lru_cache(maxsize=256)
+def own_modes(
+    number: str, holds: tuple[Hold, ...], pin: tuple[float, ...], count: int
+) -> tuple[Array, Array]:
+    """Return how a beam and its new pins vibrate when what holds them stands still.
+
+    Returns
+    -------
+    (count,) ndarray
+        Squares of the angular frequencies (1/s2), modes being of unit mass (kg).
+    (count, 6 places) ndarray
+        Inertia between each mode and the places, beside `Condensed.inertia`.
+    """
+    m = _matrices(number, holds, pin)
+    follow = -linalg.solve(m.own, m.cross, assume_a="pos")
+    # the softest of the many are wanted: the largest of the inverse problem
+    values, modes = linalg.eigh(m.inertia, m.own)
+    values, modes = values[::-1][:count], modes[:, ::-1][:, :count]
+    modes = modes / np.sqrt(values)
+    return 1.0 / values, modes.T @ m.inertia @ follow
+
+
+def _matrices(number: str, holds: tuple[Hold, ...], pin: tuple[float, ...]) -> _Matrices:
     element = _element(number)
     n = element.stiffness.shape[0]
     new_pins = sum(bool(hold.bores) for hold in holds)
@@ -183,7 +237,4 @@ def condensed(number: str, holds: tuple[Hold, ...], pin: tuple[float, ...]) -> C
             outer[here, here] += spring
             place += 1
         body += 6
-    follow = -linalg.solve((own + own.T) / 2, cross, assume_a="sym")
-    stiffness = outer + cross.T @ follow
-    carried = heavy + follow.T @ inertia @ follow
-    return Condensed((stiffness + stiffness.T) / 2, (carried + carried.T) / 2, mass)
+    return _Matrices((own + own.T) / 2, inertia, cross, outer, heavy, mass)

@@ -5,8 +5,8 @@ modes. The new beam has its own unknowns, stiffness and mass; they follow from h
 (`condense`). What is left for each candidate is an eigenvalue problem of the size of the combination,
 so a thousand candidates take a second.
 
-`Screen.refine` adds how the model gives way, statically, to loads at the very holes of one candidate:
-with these movements the forecast meets the re-analysis.
+`Screen.refine` adds how the model gives way, statically, to loads at the very holes of one candidate,
+and the new beam's own modes: with these movements the forecast meets the re-analysis.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from scipy.sparse.linalg import splu
 from technic.assembly.model import Assembly
 from technic.assembly.stiffness import StiffnessTable, default_table
 from technic.design.candidates import Attachment, Candidate
-from technic.design.condense import Condensed, Hold, condensed, hold_of
+from technic.design.condense import Condensed, Hold, condensed, hold_of, own_modes
 from technic.geometry import Array, shift_twist, turn_twist
 from technic.rigidity.eigen import elastic_modes
 from technic.rigidity.kinematics import component_motions, kinematics
@@ -40,6 +40,10 @@ _STRUCTURE: Final = 1e-3
 
 _RANK: Final = 1e-6
 """A motion is removed when the beam resists it with more than this share of a pin's shear stiffness."""
+
+_OWN: Final = 6
+"""Modes of the new beam by itself that a refined forecast takes in: a long beam on two holes may well
+be what vibrates first."""
 
 _SAME: Final = 1e-9
 """Movements that add less than this (mean square, of unit ones) to the others add nothing."""
@@ -98,7 +102,7 @@ class Screen:
         system = assemble(assembly, probes=tuple(probes))
         self._system = system
         self.mass = system.mass
-        self._moving, twists = _motions(assembly, system)
+        self._moving, twists, components = _motions(assembly, system)
         elastic = system.elastic
         a = sparse.csr_array(system.A[elastic])
         joints = a.T @ sparse.diags_array(system.rows.stiffness[elastic]) @ a
@@ -108,6 +112,8 @@ class Screen:
         kept = _moving_structure(assembly, system, self._moving, twists)
         self.motions = kept.shape[1]
         self.values: Array = np.concatenate([np.zeros(self.motions), pairs.values])
+        # motions of one connected whole take the beam along
+        self._whole = 6 if components == 1 and not assembly.supports else 0
         self._basis = np.column_stack([kept, pairs.vectors])
         self._twists = np.asarray(system.probes @ self._basis).reshape(len(probes), 6, -1)
         self._inverse: ShiftedInverse | None = None
@@ -125,15 +131,15 @@ class Screen:
         stiffness = field.T @ change.stiffness @ field
         inertia = field.T @ change.inertia @ field
         removed = self._removed(stiffness, field)
-        stiffness[np.diag_indices_from(stiffness)] += self.values
-        inertia[np.diag_indices_from(inertia)] += self.mass
+        stiffness.flat[:: len(stiffness) + 1] += self.values
+        inertia.flat[:: len(inertia) + 1] += self.mass
         values = linalg.eigvalsh(
             stiffness, inertia, check_finite=False, overwrite_a=True, overwrite_b=True
         )
         return self._lowest(values, removed, change)
 
     def _removed(self, stiffness: Array, field: Array) -> int:
-        if not self.motions:
+        if self.motions <= self._whole:
             return 0
         resisted = np.linalg.eigvalsh(stiffness[: self.motions, : self.motions])
         largest = float(np.abs(field[:, : self.motions]).max(initial=0.0)) ** 2
@@ -167,13 +173,20 @@ class Screen:
             field = self._turned(candidate, places, twists.reshape(len(places), 6, -1))
             own = field.T @ change.stiffness @ field
             removed = self._removed(own, field)
-            count = self._basis.shape[1]
-            stiffness = own.copy()
+            count, size = self._basis.shape[1], basis.shape[1]
+            stiffness = np.zeros((size + _OWN, size + _OWN))
+            stiffness[:size, :size] = own
             stiffness[range(count), range(count)] += self.values
             crossed = basis.T @ (self._stiffness @ extra)
-            stiffness[:, count:] += crossed
-            stiffness[count:, :count] += crossed[:count].T
-            inertia = field.T @ change.inertia @ field + self.mass * np.eye(len(own))
+            stiffness[:size, count:size] += crossed
+            stiffness[count:size, :count] += crossed[:count].T
+            inertia = np.zeros_like(stiffness)
+            inertia[:size, :size] = field.T @ change.inertia @ field + self.mass * np.eye(size)
+            squares, coupling = own_modes(candidate.number, self._holds(candidate), self._pin, _OWN)
+            stiffness[range(size, size + _OWN), range(size, size + _OWN)] = squares
+            inertia[range(size, size + _OWN), range(size, size + _OWN)] = 1.0
+            inertia[size:, :size] = coupling @ field
+            inertia[:size, size:] = inertia[size:, :size].T
             found = linalg.eigvalsh((stiffness + stiffness.T) / 2, inertia, check_finite=False)
         return self._lowest(found, removed, change)
 
@@ -229,8 +242,7 @@ class Screen:
 
     def _internal(self) -> Array:
         """Return the movements that the heuristic looks at, as combinations of the basis."""
-        grounded = 0 if self._assembly.supports else 6
-        if self.motions > grounded:
+        if self.motions > self._whole:
             return np.eye(len(self.values))[:, : self.motions]  # rigid motions bring no approach
         return np.eye(len(self.values))[:, self.motions : self.motions + 1]
 
@@ -260,12 +272,15 @@ class Screen:
         return float(field @ self._condensed(candidate).stiffness @ field) / 2.0
 
     def _condensed(self, candidate: Candidate) -> Condensed:
+        return condensed(candidate.number, self._holds(candidate), self._pin)
+
+    def _holds(self, candidate: Candidate) -> tuple[Hold, ...]:
         holds: list[Hold] = []
         for attachment in candidate.attachments:
             pin = attachment.fastening.old_pin
             old = self._assembly.parts[pin].definition if pin >= 0 else None
             holds.append(hold_of(candidate, attachment, old))
-        return condensed(candidate.number, tuple(holds), self._pin)
+        return tuple(holds)
 
     def _field(self, candidate: Candidate) -> Array:
         places = self._layout(candidate)
@@ -306,8 +321,10 @@ def _places(candidate: Candidate, attachment: Attachment) -> list[Key]:
     ]
 
 
-def _motions(assembly: Assembly, system: System) -> tuple[sparse.csc_array, sparse.csr_array]:
-    """Return all motions that cost nothing, as unknowns (n, k) and as scaled twists (6 p, k)."""
+def _motions(assembly: Assembly, system: System) -> tuple[sparse.csc_array, sparse.csr_array, int]:
+    """Return all motions that cost nothing, as unknowns (n, k) and as scaled twists (6 p, k), and the
+    number of connected components.
+    """
     kin = kinematics(assembly)
     columns = []
     for component in range(len(kin.components)):
@@ -320,7 +337,7 @@ def _motions(assembly: Assembly, system: System) -> tuple[sparse.csc_array, spar
         columns.append(spread @ motions.twists)
     twists = sparse.csr_array(sparse.hstack(columns))
     scale = sparse.diags_array(np.tile(kin.units, len(assembly.parts)))
-    return sparse.csc_array(system.R @ (scale @ twists)), twists
+    return sparse.csc_array(system.R @ (scale @ twists)), twists, len(kin.components)
 
 
 def _moving_structure(

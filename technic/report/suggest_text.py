@@ -103,6 +103,12 @@ def _suggestion(before: RigidityReport, suggestion: Suggestion, style: Style) ->
         f"It {describe_fit(candidate)}; {pushed}. Forecast {forecast} N/m before re-analysis.",
         "   ",
     )
+    if suggestion.twins:
+        said = f"{count(suggestion.twins, 'other place')} for the same part would do about as well"
+        if suggestion.pair is not None:
+            twin = joined([_coordinates(a.point) for a in suggestion.pair.candidate.attachments])
+            said += f"; with a second one, holes at {twin}: {_state(suggestion.pair.report)}"
+        lines += style.wrap(f"{said}.", "   ")
     return lines
 
 

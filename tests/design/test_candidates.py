@@ -5,28 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from technic.assembly.model import Assembly
-from technic.assembly.stiffness import default_table
 from technic.design.candidates import EXACT, candidates
 from technic.errors import UsageError
-from technic.ldraw.connect import connect
-from technic.ldraw.reader import lookup, read_parts
-from technic.ldraw.sections import document_from_text
-from technic.ldraw.syntax import Text
 from technic.units import LDU, MM
-
-ALONG_Z = "1 0 0 0 1 0 0 0 1"
-ALONG_X = "0 0 1 0 1 0 1 0 0"
-PIN_Y = "0 1 0 1 0 0 0 0 1"
-
-
-def build(*lines: str) -> Assembly:
-    """An assembly from lines ``"x y z matrix number"``."""
-    text = "".join(f"1 7 {line}.dat\n" for line in lines)
-    parts = read_parts(document_from_text(Text(text), "made.ldr"), lookup()).parts
-    joints, findings = connect(parts, default_table())
-    source = {"path": "made.ldr", "sha256": "", "format": "ldraw"}
-    return Assembly("made", parts, joints, findings=findings, source=source)
+from tests.design.made import ALONG_X, ALONG_Z, PIN_Y, build, from_text
 
 
 def ends(candidate):
@@ -94,8 +76,7 @@ def test_the_open_end_of_a_pin_is_used_as_it_is():
 
 
 def test_snug_is_a_class_of_its_own():
-    # 4 across, 4 along: the diagonal is 5.657 pitches; 5 across, 5 along: 7.071, a miss of 0.57 mm;
-    # 20.0 LDU apart sideways and 140 along: 141.42 LDU, 0.57 mm too long as well
+    # 0.3 LDU off the grid: each end misses by half of it, 0.06 mm
     assembly = build(f"0 0 0 {ALONG_Z} 32316", f"80.3 0 0 {ALONG_Z} 32316")
     assert candidates(assembly, lengths=[5], bent=False) == []
     snug = candidates(assembly, lengths=[5], bent=False, snug=0.1 * MM)
@@ -157,9 +138,7 @@ def test_a_pin_line_that_other_places_share_is_not_exchanged():
         f"1 7 0 0 0 {ALONG_Z} 32316.dat\n1 7 0 -20 0 {ALONG_X} 32316.dat\n"
         f"1 7 0 -10 0 {PIN_Y} 2780.dat\n0 NOFILE\n"
     )
-    parts = read_parts(document_from_text(Text(text), "main.mpd"), lookup()).parts
-    joints, _ = connect(parts, default_table())
-    assembly = Assembly("main", parts, joints, source={"format": "ldraw"})
+    assembly = from_text(text)
     found = candidates(assembly)
     assert found
     assert all(a.fastening.kind != "exchange" for c in found for a in c.attachments)
