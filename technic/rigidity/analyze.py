@@ -14,7 +14,7 @@ from scipy import sparse
 from technic.assembly.model import Assembly, FindingKind
 from technic.assembly.stiffness import StiffnessTable
 from technic.geometry import Array
-from technic.rigidity.eigen import elastic_modes
+from technic.rigidity.eigen import elastic_modes, single_thread
 from technic.rigidity.exact import lattice_rows, modular_rank
 from technic.rigidity.kinematics import (
     ComponentMotions,
@@ -96,7 +96,8 @@ def analyze(
         The eigenvalue step failed.
     """
     timings: dict[str, float] = {}
-    with _timed(timings, "mobility"):
+    # small decompositions by the hundred: a second thread makes them seven times slower
+    with _timed(timings, "mobility"), single_thread():
         kin = kinematics(assembly)
         bodies = [_body(kin, c) for c in range(len(kin.components))]
     with _timed(timings, "assemble"):
