@@ -29,7 +29,8 @@ polynomial undetermined, the plainest one is taken, and it does not swing beyond
 
 def monomials(points: Array) -> Array:
     """Return the 20 monomials at points (n, 3) of size about 1, (n, 20)."""
-    return np.column_stack([np.prod(points ** np.array(power), axis=1) for power in POWERS])
+    x, y, z = (np.array([np.ones(len(points)), p, p**2, p**3]) for p in points.T)
+    return np.column_stack([x[a] * y[b] * z[c] for a, b, c in POWERS])
 
 
 def bending_of(

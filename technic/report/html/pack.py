@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -67,6 +68,13 @@ class _Words:
 
     def number(self, text: str) -> int:
         return self.texts.setdefault(text, len(self.texts))
+
+
+def _corners(points: Sequence[Array]) -> Array:
+    """Return the corners of each part's box along the world axes, (8 p, 3): few points, same extent."""
+    boxes = np.array([(where.min(axis=0), where.max(axis=0)) for where in points])
+    picks = np.array(np.meshgrid(*[[0, 1]] * 3)).reshape(3, -1).T
+    return np.asarray(boxes[:, picks, np.arange(3)].reshape(-1, 3))
 
 
 def _extremes(points: Array) -> list[list[float]]:
@@ -197,14 +205,14 @@ def pack(report: RigidityReport, drawing: Drawing, spots: int) -> tuple[dict[str
     parts = report.assembly.parts
     block = Block()
     shapes = shapes_of(parts, drawing.solids)
-    everything = np.concatenate(drawing.points)
-    low, high = everything.min(axis=0), everything.max(axis=0)
+    corners = _corners(drawing.points)
+    low, high = corners.min(axis=0), corners.max(axis=0)
     middle = 0.5 * (low + high)
     energy = energy_shares(report)
     words = _Words()
     modes = mode_fields(report, drawing, shapes)
     field = worst_field(report)
-    toward = view_direction(everything, None if field is None else field.displacements)
+    toward = view_direction(corners, None if field is None else field.displacements)
     rotations = np.array([part.pose.rotation for part in parts])
     translations = np.array([part.pose.translation for part in parts])
     centroids = np.array([part.centroid for part in parts])
@@ -214,7 +222,7 @@ def pack(report: RigidityReport, drawing: Drawing, spots: int) -> tuple[dict[str
         "name": report.assembly.name,
         "count": len(parts),
         "half": [float(v) for v in 0.5 * (high - low) / MM],
-        "extremes": _extremes(everything - middle),
+        "extremes": _extremes(corners - middle),
         "light": shapes.light,
         "ramp": [list(stop) for stop in RAMP],
         "toward": [float(v) for v in toward],
