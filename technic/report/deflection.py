@@ -228,7 +228,9 @@ def deflection_text(case: StaticCase, style: Style | None = None) -> str:
     title = f"{assembly.name}: {count(len(parts), 'part')}, {count(len(assembly.joints), 'joint')}"
     lines = [style("bold", title), "", style("bold", "Loads"), *_loads(case, style)]
 
-    lines += ["", style("bold", "How far each part goes (its centre; x right, y down, z back)")]
+    plain = assembly.source.get("format") == "assembly"
+    axes = "x, y, z" if plain else "x right, y down, z back"
+    lines += ["", style("bold", f"How far each part goes (its centre; {axes})")]
     sizes = _norms(answer.part_twists[:, :3])
     for k in _order(sizes)[:_SHOWN]:
         move = answer.part_twists[k, :3]

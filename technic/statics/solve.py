@@ -126,6 +126,9 @@ def deflect(
     count = len(assembly.joints)
     momentum = system.R.T @ (system.mass_matrix @ x)
     inertia = sparse.csc_array(system.R.T @ system.mass_matrix @ system.R)
+    # in two dimensions a part has no motions out of the plane, and no momentum there
+    absent = (inertia.diagonal() == 0.0).astype(float)
+    inertia = sparse.csc_array(inertia + sparse.diags_array(absent))
     return Deflection(
         system=system,
         unknowns=readonly(x),
