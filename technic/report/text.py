@@ -197,7 +197,10 @@ def _rigidity(report: RigidityReport, style: Style) -> list[str]:
         lines.append("   How sure: not known, the joints' stiffnesses are not calibrated.")
     else:
         low, high = rigidity.interval_95
-        lines.append(f"   How sure: {number(low)} to {number(high)} N/m with 95 % confidence.")
+        lines.append(
+            f"   How sure: the measured joints alone leave {number(low)} to {number(high)} N/m "
+            "with 95 % confidence."
+        )
     if report.mobility.total > report.mobility.idle:
         lines += style.wrap(
             "The motions above cost nothing; this number is for what bends once they stand still.",

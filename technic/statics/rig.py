@@ -39,8 +39,6 @@ class RigModel:
         Stiffness of each in the table (N/m, N m/rad).
     owner : (r,) ndarray of int
         Parameter of each variable row.
-    factor : (r,) ndarray
-        Stiffness of the row per stiffness of its parameter (studs that act together).
     base : (3, 6) ndarray
         Displacement of the point along the axes under a unit force and under unit gravity along each,
         with the table's stiffnesses (m/N, m per m/s2).
@@ -53,7 +51,6 @@ class RigModel:
     parameters: tuple[Parameter, ...]
     start: Array
     owner: NDArray[np.int64]
-    factor: Array
     base: Array
     rows: Array
     loaded: Array
@@ -67,8 +64,8 @@ class RigModel:
             One per parameter.
         """
         stiffness = np.asarray(stiffness, dtype=float)
-        own = self.factor * stiffness[self.owner]
-        change = own - self.factor * self.start[self.owner]
+        own = stiffness[self.owner]
+        change = own - self.start[self.owner]
         moved = linalg.solve(np.eye(len(own)) + self.rows * change, self.loaded)
         # the point is loaded and measured in the same place: its probes are the first three cases
         value = self.base - (self.loaded[:, :3] * change[:, None]).T @ moved
@@ -115,6 +112,12 @@ def rig_model(
     point = system.probes[:3].toarray()
     falling = np.tile(np.vstack([np.eye(3), np.zeros((3, 3))]), (len(assembly.parts), 1))
     loads = np.column_stack([point.T, system.mass_matrix @ (system.R @ falling)])
+    factor = system.rows.stiffness[rows] / start[owner]
+    if not np.allclose(factor, 1.0, rtol=1e-9):
+        raise UsageError(
+            f"the rig {assembly.name!r} has joints whose stiffness is not the table's own (several "
+            "studs together): their lever arms mix the motions; use single ones"
+        )
     motions = free_motions(system)
     for load in loads.T:
         refuse_driven(motions, load)
@@ -124,7 +127,6 @@ def rig_model(
         parameters=tuple(parameters),
         start=start,
         owner=owner,
-        factor=system.rows.stiffness[rows] / start[owner],
         base=point @ x[:, :6],
         rows=a @ x[:, 6:],
         loaded=a @ x[:, :6],

@@ -7,7 +7,7 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from calibration.dataset import parse_csv
+from calibration.dataset import GRAVITY, parse_csv
 from calibration.diagnose import cure, grid_check, warnings
 from calibration.errors import FitError
 from calibration.fit import fit
@@ -17,6 +17,7 @@ from tests.calibration.synthetic import BOTH, PAIR, SHEAR, TILT, pin_model, text
 TRUTH = np.array([SHEAR, TILT])
 FAR_START = np.array([9e3, 1.5])
 EDGE, FLAT = PAIR[:1], PAIR[1:]
+HOLE = "9:32526:hole1"
 
 
 def readings(*args, **kwargs):
@@ -188,3 +189,37 @@ def test_ten_thousand_rows_take_less_than_ten_seconds():
     assert perf_counter() - began < 10.0
     assert grid.agrees
     assert found.log_stiffness == pytest.approx(np.log(TRUTH), abs=0.01)
+
+
+def test_own_weight_counts_where_no_unloaded_reading_was_taken():
+    rigs, values = shipped_rigs(), np.log(TRUTH)
+    lines = [text().splitlines()[0]]
+    for pose in ("edge", "flat"):
+        condition = Condition("pin-pair", pose, rigs["pin-pair"].poses[pose].angle_deg, HOLE)
+        answer = pin_model()([condition], values)
+        for load in (5, 10, 20):
+            force = load * 1e-3 * GRAVITY
+            down = 1e3 * float(force * answer.per_newton[0] + answer.own_weight[0])
+            lines.append(f"t,pin/pin_hole,pin-pair,{pose},,1,1,32,{load},{down!r},NA,0.1,,")
+    data = parse_csv("\n".join(lines), rigs).readings
+    found = fit(data, pin_model(), FAR_START)
+    assert np.exp(found.log_stiffness) == pytest.approx(TRUTH, rel=1e-6)
+
+
+def test_the_measured_angle_of_a_pose_counts():
+    rigs = shipped_rigs()
+    lines = [text().splitlines()[0]]
+    for pose, angle in (("edge", 78.0), ("flat", 9.0)):
+        condition = Condition("pin-pair", pose, angle, HOLE)
+        per_newton = float(pin_model()([condition], np.log(TRUTH)).per_newton[0])
+        for load in (10, 20):
+            down = 1e3 * per_newton * load * 1e-3 * GRAVITY
+            lines.append(f"t,pin/pin_hole,pin-pair,{pose},{angle},1,1,32,{load},{down!r},0,0.1,,")
+    exact = parse_csv("\n".join(lines), rigs).readings
+    found = fit(exact, pin_model(), FAR_START)
+    assert np.exp(found.log_stiffness) == pytest.approx(TRUTH, rel=1e-6)
+    blank = parse_csv(
+        "\n".join(lines).replace(",78.0,", ",,").replace(",9.0,", ",,"), rigs
+    ).readings
+    off = fit(blank, pin_model(), FAR_START)
+    assert np.abs(off.log_stiffness - np.log(TRUTH)).max() > 0.02

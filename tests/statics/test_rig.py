@@ -10,6 +10,7 @@ import pytest
 from calibration.rigs import shipped_rigs
 from technic.assembly.select import parse_fix
 from technic.assembly.stiffness import StiffnessValue, default_table
+from technic.errors import UsageError
 from technic.loading import load
 from technic.statics.loads import parse_probe
 from technic.statics.rig import rig_model
@@ -122,3 +123,22 @@ def test_closed_form_of_rigid_beams_on_springs(place, down):
         assert sag["rigid"] == pytest.approx(expected, rel=0.02)
         # beams that bend and twist sag more, but on a good rig the joints decide
         assert sag["rigid"] < sag["frame"] < 1.3 * sag["rigid"]
+
+
+def test_studs_that_act_together_are_refused(tmp_path):
+    path = tmp_path / "studs.ldr"
+    path.write_text(
+        "0 studs\n1 4 0 0 0 1 0 0 0 1 0 0 0 1 3700.dat\n1 4 0 -24 0 1 0 0 0 1 0 0 0 1 3700.dat\n"
+    )
+    assembly = load(path)
+    assembly = replace(assembly, supports=(parse_fix(assembly, "2:3700"),))
+    probe = parse_probe(assembly, "3:3700:hole1")
+    with pytest.raises(UsageError, match="several studs"):
+        rig_model(assembly, probe, [Parameter("stud/tube", "tilt")], default_table())
+
+
+def test_a_rig_without_the_joint_is_refused():
+    assembly = held(shipped_rigs()["pin-pair"], default_table())
+    probe = parse_probe(assembly, "9:32526:hole1")
+    with pytest.raises(UsageError, match="no joint that holds shear of ball/socket"):
+        rig_model(assembly, probe, [Parameter("ball/socket", "shear")], default_table())
