@@ -13,11 +13,17 @@ from technic.commands.options import (
     AxleSlideOption,
     CalibrationOption,
     FixOption,
+    GearsOption,
+    InnerOption,
     JsonOption,
+    LibraryOption,
+    NoLibraryOption,
+    OverridesOption,
     PartModelOption,
     QuietOption,
+    ShadowOption,
 )
-from technic.commands.reading import reading
+from technic.commands.reading import ModelOptions, reading
 from technic.errors import UsageError
 
 if TYPE_CHECKING:
@@ -89,6 +95,12 @@ def deflect(
     json: JsonOption = None,
     axle_slide: AxleSlideOption = "held",
     calibration: CalibrationOption = None,
+    gears: GearsOption = "off",
+    inner: InnerOption = "held",
+    overrides: OverridesOption = None,
+    library: LibraryOption = None,
+    no_library: NoLibraryOption = False,
+    shadow: ShadowOption = None,
     parts: PartModelOption = "frame",
     quiet: QuietOption = False,
 ) -> None:
@@ -108,7 +120,15 @@ def deflect(
         raise UsageError("nothing acts on the model; give --load, --hang or --gravity")
     if json is not None and json != STDOUT:
         check_writable(Path(json))
-    how = reading(model, axle_slide, calibration)
+    more = ModelOptions(
+        library=library,
+        no_library=no_library,
+        shadow=shadow,
+        gears=gears,
+        inner=inner,
+        overrides=overrides,
+    )
+    how = reading(model, axle_slide, calibration, more)
     assembly = load_model(model, **how)
     supports = tuple(parse_fix(assembly, text) for text in fix or ())
     assembly = replace(assembly, supports=assembly.supports + supports)

@@ -270,6 +270,9 @@ def _qualifier(assembly: Assembly) -> str:
         return "at most"
     if any(f.kind is FindingKind.OFF_GRID for f in assembly.findings):
         return "at least"
+    # A motor or actuator that is taken as one body, because it holds its position, can let go.
+    if any(f.kind is FindingKind.INNER and len(f.parts) == 1 for f in assembly.findings):
+        return "at least"
     return ""
 
 

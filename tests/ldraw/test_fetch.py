@@ -36,7 +36,7 @@ class Server:
         outer = self
 
         class Handler(BaseHTTPRequestHandler):
-            def do_GET(self):  # noqa: N802 (the name is the library's)
+            def do_GET(self):
                 outer.answer(self)
 
             def log_message(self, *_):
