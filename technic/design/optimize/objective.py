@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import sparse
 
 from technic.design.optimize.gradient import eigenvalue_gradients, length_gradient
+from technic.design.optimize.modes import Tracker
 from technic.design.optimize.moving import Model, moved
 from technic.errors import NumericalError, UsageError
 from technic.geometry import Array, shift_twist
-from technic.rigidity.eigen import elastic_modes
 from technic.rigidity.kinematics import component_motions, kinematics
 
 __all__ = ["Objective", "Point", "spectrum"]
@@ -90,7 +90,7 @@ class Motions:
 
 
 def spectrum(
-    model: Model, motions: Motions, positions: Array, count: int = CLUSTER
+    model: Model, motions: Motions, positions: Array, tracker: Tracker | None = None
 ) -> tuple[Array, Array]:
     """Return the lowest eigenvalues (N/m) and their derivatives (k, v, 3).
 
@@ -101,15 +101,12 @@ def spectrum(
     if free is None:
         return np.zeros(0), np.zeros((0, *positions.shape))
     try:
-        pairs = elastic_modes(
-            matrices.stiffness, matrices.measure, matrices.constraints, free, count
-        )
+        values, vectors = (tracker or Tracker(CLUSTER)).modes(matrices, free)
     except NumericalError:
         return np.zeros(0), np.zeros((0, *positions.shape))
-    if not len(pairs.values):
+    if not len(values):
         raise UsageError("nothing in the assembly can give way: it has no elastic mode")
-    slopes = eigenvalue_gradients(model, positions, matrices, pairs.values, pairs.vectors)
-    return pairs.values, slopes
+    return values, eigenvalue_gradients(model, positions, matrices, values, vectors)
 
 
 @dataclass(slots=True, eq=False)
@@ -130,6 +127,7 @@ class Objective:
     start_rigidity, start_edges : float
         Scales: N/m and m.
     sharpness : float
+    tracker : Tracker
     """
 
     model: Model
@@ -139,6 +137,7 @@ class Objective:
     start_rigidity: float
     start_edges: float
     sharpness: float = 20.0
+    tracker: Tracker = field(default_factory=lambda: Tracker(CLUSTER))
 
     def at(self, positions: Array) -> Point:
         """Return value and derivative at some positions."""
@@ -147,7 +146,7 @@ class Objective:
         edges = float(lengths.sum())
         if lengths.min() <= 1e-6 * self.start_edges / len(lengths):
             return self._hopeless(positions, edges)
-        values, slopes = spectrum(self.model, self.motions, positions)
+        values, slopes = spectrum(self.model, self.motions, positions, self.tracker)
         if not len(values):
             return self._hopeless(positions, edges)
         scaled = values / self.start_rigidity
