@@ -33,7 +33,7 @@ def _scale(reports: Sequence[RigidityReport], drawings: Sequence[Drawing]) -> fl
         load = unit_load(report)
         furthest = 0.0 if load is None else furthest_way(report, drawing, load[1])
         if furthest > 0.0:
-            scales.append(deformation_scale(drawing, furthest))
+            scales.append(deformation_scale(report, drawing, furthest))
     return min(scales, default=0.0)
 
 

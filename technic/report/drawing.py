@@ -88,6 +88,10 @@ def furthest_way(report: RigidityReport, drawing: Drawing, twists: Array) -> flo
     return best
 
 
-def deformation_scale(drawing: Drawing, furthest: float) -> float:
-    """Return the round factor that shows a deformation whose furthest point goes `furthest` (m)."""
-    return nice(_DEFORMED_SHARE * drawing.diagonal / furthest)
+def deformation_scale(report: RigidityReport, drawing: Drawing, furthest: float) -> float:
+    """Return the round factor that shows a deformation whose furthest point goes `furthest` (m).
+
+    It is measured against the heaviest component, which is the one that deforms.
+    """
+    moving = np.concatenate([drawing.points[k] for k in report.components[0].parts])
+    return nice(_DEFORMED_SHARE * float(np.linalg.norm(np.ptp(moving, axis=0))) / furthest)

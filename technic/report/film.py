@@ -46,7 +46,7 @@ def _mode(report: RigidityReport, drawing: Drawing) -> tuple[Poses, LegendItem] 
     if load is None or furthest == 0.0:
         return None
     twists = load[1]
-    scale = deformation_scale(drawing, furthest)
+    scale = deformation_scale(report, drawing, furthest)
     words = f"worst-case load of 1 N, deformation drawn {scale:g} x; grey: at rest"
     return (
         lambda phase: deformed_points(report, drawing, twists, scale * phase),

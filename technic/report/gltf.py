@@ -106,7 +106,7 @@ def _moved(report: RigidityReport, drawing: Drawing) -> tuple[float, Sequence[Ar
     furthest = 0.0 if load is None else furthest_way(report, drawing, load[1])
     if load is None or furthest == 0.0:
         return 0.0, ()
-    scale = deformation_scale(drawing, furthest)
+    scale = deformation_scale(report, drawing, furthest)
     return scale, deformed_points(report, drawing, load[1], scale)
 
 

@@ -145,7 +145,7 @@ def _elastic_panel(
     furthest = furthest_way(report, drawing, twists)
     if furthest == 0.0:
         return None
-    scale = deformation_scale(drawing, furthest)
+    scale = deformation_scale(report, drawing, furthest)
     moved = deformed_points(report, drawing, twists, scale)
     body, edges = model_layers(drawing, moved)
     arrows, largest = load_arrows(report, drawing, field, scale)

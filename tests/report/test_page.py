@@ -75,6 +75,22 @@ def contents(text: str) -> tuple[dict, Callable[[dict], np.ndarray]]:
     return json.loads(reader.element("contents")), array
 
 
+def unpacked(codes: np.ndarray, flags: np.ndarray) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """Triangles and edges as the viewer unpacks them (web/src/data.js)."""
+    corners, seen = [], 0
+    for code in codes.tolist():
+        corners.append(seen - code)
+        seen += code == 0
+    faces = np.array(corners).reshape(-1, 3)
+    edges = [
+        (int(face[c]), int(face[(c + 1) % 3]))
+        for face, flag in zip(faces, flags.tolist(), strict=True)
+        for c in range(3)
+        if flag & 1 << c
+    ]
+    return faces, edges
+
+
 def test_policy_admits_exactly_the_script_and_the_style(pair: RigidityReport) -> None:
     text = page(pair)
     policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', text)
@@ -139,10 +155,14 @@ def test_viewer_puts_parts_where_they_are(scissors: RigidityReport) -> None:
     translations = array(found["translations"]).reshape(-1, 3)
     for shape in found["shapes"]:
         points = array(shape["points"]).reshape(-1, 3)
-        assert array(shape["faces"]).max() < len(points)
+        faces, edges = unpacked(array(shape["faces"]), array(shape["edges"]))
         for k in array(shape["parts"]):
             world = points @ rotations[k].T + translations[k]
-            assert np.allclose(world, 1e3 * (drawing.points[k] - middle), atol=1e-3)
+            wanted = 1e3 * (drawing.points[k] - middle)
+            assert np.allclose(world[faces], wanted[drawing.solids[k].faces], atol=1e-3)
+            drawn = {frozenset(map(tuple, world[list(edge)].round(2).tolist())) for edge in edges}
+            sharp = wanted[drawing.solids[k].edges].round(2)
+            assert len(edges) == len(sharp) == len(drawn)
 
 
 def test_motion_of_the_viewer_is_that_of_the_report(scissors: RigidityReport) -> None:

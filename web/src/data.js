@@ -7,6 +7,28 @@ const KINDS = {
   uint8: Uint8Array,
 };
 
+/** Return the corners of all triangles from their codes: steps back from the newest corner. */
+export function unpackFaces(codes) {
+  const faces = new Uint16Array(codes.length);
+  let seen = 0;
+  codes.forEach((code, k) => {
+    faces[k] = seen - code;
+    if (code === 0) seen++;
+  });
+  return faces;
+}
+
+/** Return the edges, two corners each, from the flags at the sides of the triangles. */
+export function unpackEdges(faces, flags) {
+  const edges = [];
+  flags.forEach((flag, k) => {
+    for (let c = 0; c < 3; c++) {
+      if (flag & (1 << c)) edges.push(faces[3 * k + c], faces[3 * k + ((c + 1) % 3)]);
+    }
+  });
+  return new Uint16Array(edges);
+}
+
 /** Unpack the block and return the contents with a function that finds an array in it. */
 export async function readModel() {
   const contents = JSON.parse(document.getElementById("contents").textContent);

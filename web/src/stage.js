@@ -20,6 +20,7 @@ import {
   WebGLRenderTarget,
   WebGLRenderer,
 } from "three";
+import { unpackEdges, unpackFaces } from "./data.js";
 import * as shaders from "./shaders.js";
 
 const LOAD = [0.96, 0.49, 0.0];
@@ -175,15 +176,16 @@ export class Stage {
         const made = new InstancedBufferGeometry();
         made.setAttribute("position", points);
         made.setAttribute("part", members);
-        made.setIndex(new BufferAttribute(array(indices), 1));
+        made.setIndex(new BufferAttribute(indices, 1));
         made.instanceCount = members.count;
         return made;
       };
-      const faces = geometry(shape.faces);
+      const corners = unpackFaces(array(shape.faces));
+      const faces = geometry(corners);
       this.add(new Mesh(faces, solid));
       this.add(new Mesh(faces, pick), this.pickScene);
       if (shape.edges.length === 0) continue;
-      const segments = geometry(shape.edges);
+      const segments = geometry(unpackEdges(corners, array(shape.edges)));
       this.edges.push(this.add(new LineSegments(segments, edge)));
       const outline = this.add(new LineSegments(segments, this.outlineMaterial));
       outline.visible = false;

@@ -102,7 +102,7 @@ def mode_fields(report: RigidityReport, drawing: Drawing, shapes: Shapes) -> lis
         furthest = _furthest(drawing, shapes, twists)
         if furthest == 0.0:
             continue
-        scale = deformation_scale(drawing, furthest)
+        scale = deformation_scale(report, drawing, furthest)
         if n == 0 and report.node_points:
             bending, sizes = _bending(report, mode, shapes)
             fields.append(Field(twists, scale, bending, sizes))

@@ -22,6 +22,7 @@ from technic.report.camera import view_direction
 from technic.report.drawing import Drawing
 from technic.report.energy import energy_shares
 from technic.report.heat import RAMP
+from technic.report.html.compact import compact
 from technic.report.html.fields import Field, mode_fields, motion_fields
 from technic.report.html.shapes import Shapes, shapes_of
 from technic.report.load_arrows import ARROW_RADIUS, ARROW_SHARE, load_samples
@@ -111,12 +112,14 @@ def _shapes(block: Block, shapes: Shapes) -> list[dict[str, Any]]:
         members[t].append(k)
     return [
         {
-            "points": block.add(solid.points / MM, "float32"),
-            "faces": block.add(solid.faces, "uint16"),
-            "edges": block.add(solid.edges, "uint16"),
+            "points": block.add(points / MM, "float32"),
+            "faces": block.add(codes, "uint16"),
+            "edges": block.add(flags, "uint8"),
             "parts": block.add(mine, "uint32"),
         }
-        for solid, mine in zip(shapes.solids, members, strict=True)
+        for (points, codes, flags), mine in zip(
+            (compact(solid) for solid in shapes.solids), members, strict=True
+        )
     ]
 
 
