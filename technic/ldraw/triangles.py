@@ -178,7 +178,9 @@ def _flatten(library: Library, key: str, fine: bool, trail: tuple[str, ...]) -> 
         flags.append(below.certified)
         missing += below.missing
     flat = _Flat(np.concatenate(parts), np.concatenate(flags), tuple(dict.fromkeys(missing)))
-    if key.startswith(("p/", "parts/s/", "unofficial/p/", "unofficial/parts/s/")):
+    # Only what others refer to: of a part itself the definition is kept. Without this a chain of files
+    # that name the next one twice would be walked 2^n times.
+    if trail or key.startswith(("p/", "parts/s/", "unofficial/p/", "unofficial/parts/s/")):
         library.memo[memo_key] = flat
     return flat
 

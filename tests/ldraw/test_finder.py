@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from time import perf_counter
+
 import pytest
 
 from technic.errors import InputError, UsageError
@@ -148,3 +150,19 @@ def test_submodels_are_not_looked_for_in_the_library():
         raise AssertionError("not needed")
 
     assert PartFinder(opener)("arm.ldr") is None
+
+
+def test_files_that_double_at_every_level_take_no_time(library, model):
+    chain = {f"level{k}": part(line(f"level{k + 1}.dat") * 2) for k in range(50)}
+    start = perf_counter()
+    empty = library(xbeam=part(line("level0.dat")), level50=part(), **chain)
+    (unknown,) = load_ldraw(model(BEAM, PIN, OWN), library=empty).unknown
+    assert "no surface" in unknown.reason
+    assert perf_counter() - start < 5.0
+
+
+def test_surfaces_that_double_at_every_level_are_refused(library, model):
+    chain = {f"level{k}": part(line(f"level{k + 1}.dat") * 2) for k in range(50)}
+    full = library(xbeam=part(line("level0.dat")), level50=part(HOLE), **chain)
+    (unknown,) = load_ldraw(model(BEAM, PIN, OWN), library=full).unknown
+    assert "more than" in unknown.reason
