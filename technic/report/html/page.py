@@ -108,7 +108,11 @@ def facts(report: RigidityReport) -> list[tuple[str, str, str]]:
             )
         if rigidity.frequency_hz is not None:
             found.append(
-                ("Lowest natural frequency", f"{number(rigidity.frequency_hz)} Hz", "of its own")
+                (
+                    "Lowest natural frequency",
+                    f"{number(rigidity.frequency_hz)} Hz",
+                    "as it swings after a tap",
+                )
             )
     mobility = report.mobility
     said = [f"{mobility.spinning} spin", f"{mobility.sliding} slide", f"{mobility.idle} idle"]
