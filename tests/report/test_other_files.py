@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -153,7 +154,7 @@ def test_gltf_opens_in_another_program(chassis: RigidityReport, tmp_path: Path) 
 
     target = tmp_path / "model.glb"
     write_gltf(chassis, target)
-    scene = trimesh.load(target)
+    scene: Any = trimesh.load(target)
     points = np.concatenate(drawing_of(chassis.assembly).points)
     assert np.allclose(scene.extents, np.ptp(points, axis=0), atol=1e-5)
     assert len(scene.graph.nodes_geometry) == len(chassis.assembly.parts)
@@ -219,7 +220,7 @@ def test_film_becomes_an_animation(pair: RigidityReport) -> None:
     from technic.report.render import Painter
 
     short = film(pair)
-    image = Image.open(io.BytesIO(Painter().picture(replace(short, order=(0, 3, 6)))))
+    image: Any = Image.open(io.BytesIO(Painter().picture(replace(short, order=(0, 3, 6)))))
     assert image.format == "GIF"
     assert image.n_frames == 3
 
