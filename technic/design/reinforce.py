@@ -8,7 +8,7 @@ from technic.assembly.model import Assembly
 from technic.assembly.stiffness import StiffnessTable
 from technic.design.apply import HIGHLIGHT
 from technic.design.filters import Filters, carried_over
-from technic.design.suggest import SHORTLIST, Progress, Rank, Suggestions, merit, suggest
+from technic.design.suggest import SHORTLIST, Progress, Rank, Suggestions, freedom, merit, suggest
 from technic.ldraw.connect import AxleSlide
 from technic.rigidity.analyze import analyze
 from technic.rigidity.result import RigidityReport
@@ -37,7 +37,7 @@ def reinforce(
     steps : int
         Most beams to add.
     target : float, optional
-        Stop when the model is rigid and this stiff (N/m).
+        Stop when the model is rigid, of one piece, and this stiff (N/m).
     filters, shortlist, rank, color, axle_slide, table, progress
         As for `suggest`; the inventory is used up on the way.
 
@@ -84,6 +84,6 @@ def reinforce(
 
 
 def _reached(report: RigidityReport, target: float) -> bool:
-    if report.mobility.structural or report.rigidity is None:
+    if freedom(report) or report.rigidity is None:
         return False
     return report.rigidity.value >= target

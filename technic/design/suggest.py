@@ -27,7 +27,7 @@ from technic.ldraw.connect import AxleSlide
 from technic.rigidity.analyze import analyze
 from technic.rigidity.result import MotionKind, RigidityReport, WeakSpot
 
-__all__ = ["Pair", "Progress", "Rank", "Suggestion", "Suggestions", "merit", "suggest"]
+__all__ = ["Pair", "Progress", "Rank", "Suggestion", "Suggestions", "freedom", "merit", "suggest"]
 
 Rank = Literal["ritz", "paper"]
 
@@ -79,8 +79,8 @@ class Suggestion:
     report : RigidityReport
         Of the reinforced model.
     factor : float or None
-        Rigidity after by before; None when one of them is missing, or when motions went, for then the
-        two numbers do not tell of the same thing.
+        Rigidity after by before; None when one of them is missing, or when motions went or pieces were
+        joined, for then the two numbers do not tell of the same thing.
     stops : tuple of int
         Structural motions of the model before, counted from 1, that the beam resists.
     relieves : (WeakSpot, float) or None
@@ -121,12 +121,15 @@ class Suggestions:
         Places for beams that were forecast.
     refused : Counter
         Why places at the top of the order were not taken, and how often.
+    unseen : tuple of int
+        Parts without a known shape: what they are in the way of was not found out.
     """
 
     before: RigidityReport
     suggestions: tuple[Suggestion, ...]
     places: int
     refused: Counter[str] = field(default_factory=Counter)
+    unseen: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -233,7 +236,7 @@ def suggest(
         tell("prove", len(proven), count)
     proven.sort(key=lambda s: merit(s.report), reverse=True)
     best = tuple(replace(s, rank=n) for n, s in enumerate(proven, start=1))
-    return Suggestions(before, best, len(found), refused)
+    return Suggestions(before, best, len(found), refused, tuple(surroundings.shapeless))
 
 
 def _silent(_stage: str, _done: int, _total: int) -> None:
@@ -349,10 +352,15 @@ def _suggestion(
     )
 
 
+def freedom(report: RigidityReport) -> int:
+    """Return how many ways structure can move: its motions, and six for each separate piece."""
+    return report.mobility.structural + 6 * (len(report.components) - 1)
+
+
 def merit(report: RigidityReport) -> tuple[float, float]:
-    """Return what models are compared by: fewer structural motions first, then the rigidity."""
+    """Return what models are compared by: less freedom first, then the rigidity."""
     return (
-        -float(report.mobility.structural),
+        -float(freedom(report)),
         report.rigidity.value if report.rigidity is not None else np.inf,
     )
 
@@ -360,7 +368,7 @@ def merit(report: RigidityReport) -> tuple[float, float]:
 def _factor(before: RigidityReport, after: RigidityReport) -> float | None:
     if before.rigidity is None or after.rigidity is None:
         return None
-    if before.mobility.structural != after.mobility.structural:
+    if freedom(before) != freedom(after):
         return None
     return after.rigidity.value / before.rigidity.value
 
@@ -383,7 +391,7 @@ def _stops(
 
 def _relieves(before: RigidityReport, after: RigidityReport) -> tuple[WeakSpot, float] | None:
     """Return the weak spot that loses most of its share in the strain energy."""
-    if after.mobility.structural < before.mobility.structural:
+    if freedom(after) != freedom(before):
         return None
     shares = {_spot_id(after, s): s.energy_share for s in after.weak_spots}
     best: tuple[WeakSpot, float] | None = None

@@ -48,6 +48,9 @@ def suggestions_dict(answers: Sequence[Suggestions], *, sequence: bool) -> dict[
             reason: sum(a.refused[reason] for a in answers)
             for reason in sorted({r for a in answers for r in a.refused})
         },
+        "not_checked": []
+        if before is None
+        else [before.assembly.parts[k].id for k in answers[0].unseen],
         "suggestions": [
             _suggestion(own_before, suggestion, rank)
             for rank, (own_before, suggestion) in enumerate(pairs, start=1)

@@ -58,6 +58,9 @@ def hole_words(assembly: Assembly, attachment: Attachment) -> str:
 
 def cure_words(before: RigidityReport, suggestion: Suggestion) -> str:
     """Return what gets better."""
+    joined_now = len(before.components) - len(suggestion.report.components)
+    if joined_now > 0:
+        return f"joins {count(joined_now, 'separate piece')} to the rest"
     went = before.mobility.structural - suggestion.report.mobility.structural
     if went > 0:
         if not suggestion.stops:
@@ -134,6 +137,22 @@ def _none(answer: Suggestions, style: Style) -> list[str]:
     return style.wrap(f"Nothing fits: {why}.")
 
 
+def _unseen(answer: Suggestions, style: Style) -> list[str]:
+    """Say what the search for collisions did not see."""
+    parts = answer.before.assembly.parts
+    said = []
+    if answer.unseen:
+        names = sorted({parts[k].number for k in answer.unseen})
+        shown = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
+        said.append(f"{count(len(answer.unseen), 'part')} of unknown shape ({shown})")
+    unknown = sum(part.count for part in answer.before.assembly.unknown)
+    if unknown:
+        said.append(f"{count(unknown, 'unknown part')}")
+    if not said:
+        return []
+    return style.wrap(f"Not checked: whether {joined(said)} would be in the way.")
+
+
 def _how_sure(report: RigidityReport, style: Style) -> list[str]:
     rigidity = report.rigidity
     if rigidity is None or rigidity.interval_95 is None:
@@ -155,7 +174,7 @@ def alternatives_text(answer: Suggestions, style: Style | None = None) -> str:
     lines += ["", f"One part, best first (of {count(answer.places, 'place')}):"]
     for suggestion in answer.suggestions:
         lines += ["", *_suggestion(answer.before, suggestion, style)]
-    lines += ["", *_how_sure(answer.suggestions[0].report, style)]
+    lines += ["", *_unseen(answer, style), *_how_sure(answer.suggestions[0].report, style)]
     return "\n".join(lines) + "\n"
 
 
@@ -176,7 +195,8 @@ def sequence_text(answers: Sequence[Suggestions], style: Style | None = None) ->
         last = taken[-1].suggestions[0].report
         lines += ["", *style.wrap(f"In the end: {_state(last)}.{_gain(answers[0].before, last)}")]
         said = joined([f"{n} x {part}" for part, n in sorted(total.items())])
-        lines += [*style.wrap(f"Parts: {said}."), *_how_sure(last, style)]
+        lines += [*style.wrap(f"Parts: {said}."), *_unseen(answers[0], style)]
+        lines += _how_sure(last, style)
     return "\n".join(lines) + "\n"
 
 

@@ -9,8 +9,9 @@ from technic.design.filters import Filters, allowed, carried_over, needs
 from technic.design.reinforce import reinforce
 from technic.design.suggest import suggest
 from technic.errors import UsageError
+from technic.report.suggest_text import cure_words
 from technic.units import LDU
-from tests.design.made import ALONG_Z, SQUARE, build
+from tests.design.made import ALONG_Z, PIN_Y, SQUARE, build
 
 
 @pytest.fixture(scope="module")
@@ -96,3 +97,19 @@ def test_only_lego_models_get_suggestions(square):
 
     with pytest.raises(UsageError, match="LDraw"):
         suggest(replace(square, source={"format": "assembly"}))
+
+
+def test_separate_pieces_are_joined_first():
+    pieces = build(
+        f"0 0 0 {ALONG_Z} 32316",
+        f"0 -20 0 {ALONG_Z} 32316",
+        f"0 -10 -40 {PIN_Y} 2780",
+        f"0 -10 40 {PIN_Y} 2780",
+        f"100 0 0 {ALONG_Z} 32316",
+    )
+    answer = suggest(pieces, count=1)
+    assert len(answer.before.components) == 2
+    (best,) = answer.suggestions
+    assert len(best.report.components) == 1
+    assert best.factor is None
+    assert cure_words(answer.before, best) == "joins 1 separate piece to the rest"
