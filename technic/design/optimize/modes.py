@@ -25,7 +25,7 @@ __all__ = ["Tracker"]
 SHIFT: Final = 0.1
 """Shift in units of the lowest eigenvalue of the geometry before."""
 
-POWERS: Final = 4
+POWERS: Final = 5
 """Applications of the inverse to the block."""
 
 NEW: Final = 3

@@ -42,7 +42,7 @@ REACH: Final = 0.15
 SMALL: Final = 5e-4
 """The search ends when moves are limited to this share of the mean bar length..."""
 
-GAIN: Final = 1e-3
+GAIN: Final = 5e-3
 """...or a round gains less than this share of the objective, at every sharpness."""
 
 BROKEN: Final = 1e-6
@@ -229,7 +229,7 @@ class _Search:
                     reach *= 1.6 if touched and not poor else 0.5
                 else:
                     poor, reach = poor + 1, 0.3 * reach
-                if poor > 1:
+                if poor > 0:
                     break
 
 
@@ -244,7 +244,7 @@ def optimize(
     clearance: float | None = None,
     max_mass: float | None = None,
     restarts: int = 0,
-    max_evaluations: int = 400,
+    max_evaluations: int = 150,
     max_seconds: float = np.inf,
     seed: int = 0,
     progress: Callable[[Step], None] | None = None,
