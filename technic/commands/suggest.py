@@ -15,10 +15,13 @@ from technic.commands.options import (
     AxleSlideOption,
     CalibrationOption,
     JsonOption,
+    LibraryOption,
+    NoLibraryOption,
     PictureOption,
     QuietOption,
+    ShadowOption,
 )
-from technic.commands.reading import reading
+from technic.commands.reading import ModelOptions, reading
 from technic.errors import UsageError
 
 if TYPE_CHECKING:
@@ -213,6 +216,9 @@ def suggest(
     ] = False,
     axle_slide: AxleSlideOption = "held",
     calibration: CalibrationOption = None,
+    library: LibraryOption = None,
+    no_library: NoLibraryOption = False,
+    shadow: ShadowOption = None,
     quiet: QuietOption = False,
 ) -> None:
     """Say which real beam makes a model more rigid, and write the model with it."""
@@ -232,7 +238,8 @@ def suggest(
             check_writable(path)
     if model.suffix.lower() == ".json":
         raise UsageError("suggestions are made of LEGO parts: give an LDraw model (.ldr, .mpd)")
-    options = reading(model, axle_slide, calibration)
+    more = ModelOptions(library=library, no_library=no_library, shadow=shadow)
+    options = reading(model, axle_slide, calibration, more)
     assembly = load(model, **options)
     joining = {key: options[key] for key in ("axle_slide", "table") if key in options}
     wishes = _Wishes(

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from technic.assembly.model import Assembly, Part, Source
+from technic.assembly.model import Assembly, Joint, Part, Source
 from technic.assembly.stiffness import StiffnessTable, default_table
 from technic.design.candidates import Candidate
 from technic.design.sites import NEW
@@ -31,6 +31,10 @@ __all__ = ["HIGHLIGHT", "Change", "change_of", "extend", "reinforced_text", "wri
 
 HIGHLIGHT: Final = 25
 """Orange: the colour of new parts, rare enough in models to stand out."""
+
+
+INSIDE: Final = "inside/"
+"""How the connections of joints inside one divided part begin (`technic.ldraw.inner`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,8 +110,21 @@ def extend(
         for new in change.added:
             number += 1
             parts.append(_part(new, number, step))
-    joints, findings = connect(parts, table or default_table(), axle_slide=axle_slide)
+    joints, findings = connect(
+        parts, table or default_table(), axle_slide=axle_slide, inner=_inside(assembly, parts)
+    )
     return replace(assembly, parts=tuple(parts), joints=joints, findings=findings, supports=())
+
+
+def _inside(assembly: Assembly, parts: Sequence[Part]) -> list[Joint]:
+    """Return the joints inside divided parts (motors, shock absorbers), for the parts as they are now."""
+    place = {part.id: k for k, part in enumerate(parts)}
+    out = []
+    for joint in assembly.joints:
+        if joint.connection.startswith(INSIDE):
+            first, second = (place[assembly.parts[k].id] for k in joint.parts)
+            out.append(replace(joint, parts=(first, second)))
+    return out
 
 
 def _part(new: NewPart, number: int, step: int) -> Part:

@@ -75,3 +75,18 @@ def test_the_model_itself_is_never_overwritten(square):
     with pytest.raises(UsageError, match="must not replace"):
         write_reinforced(square, square, assembly, [change])
     assert square.read_bytes() == before
+
+
+def test_joints_inside_a_part_stay(square, tmp_path):
+    """A universal joint is read as two pieces: they stay joined in the extended model."""
+    path = tmp_path / "universal.ldr"
+    path.write_bytes(square.read_bytes() + b"1 7 300 0 0 1 0 0 0 1 0 0 0 1 61903.dat\r\n")
+    assembly = load_ldraw(path)
+    inside = [j for j in assembly.joints if j.connection.startswith("inside/")]
+    assert inside
+    change = change_of(assembly, chosen(assembly, "exchange"))
+    target = tmp_path / "new.ldr"
+    write_reinforced(path, target, assembly, [change])
+    again, made = load_ldraw(target), extend(assembly, [change])
+    assert sorted(j.parts for j in again.joints) == sorted(j.parts for j in made.joints)
+    assert sum(j.connection.startswith("inside/") for j in made.joints) == len(inside)
