@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import csv
-import subprocess
-import sys
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -256,7 +253,10 @@ def test_fasteners_are_pins_axles_bushes_and_joiners() -> None:
         if part.fastener:
             assert part.family.split("-")[0] in ("pin", "axle", "bush"), part.id
             lines = {tuple(np.round(np.abs(port.axis), 3)) for port in part.ports}
-            across = part.family in ("pin-with-hole", "pin-perpendicular")  # alone they turn in place
+            across = part.family in (
+                "pin-with-hole",
+                "pin-perpendicular",
+            )  # alone they turn in place
             assert len(lines) <= 1 + across, f"{part.id} joins across more than one line"
 
 
@@ -297,30 +297,6 @@ def test_a_broken_port_names_part_and_phrase(ports: str, message: str) -> None:
     with pytest.raises(SchemaError, match=message) as caught:
         Catalogue(rows, masses).get("1")
     assert ports in str(caught.value)
-
-
-@pytest.mark.speed
-def test_the_catalogue_loads_in_time(benchmark_process: Callable[[str], float]) -> None:
-    assert benchmark_process("from technic.parts.catalogue import catalogue; catalogue()") < 0.15
-
-
-@pytest.fixture
-def benchmark_process() -> Callable[[str], float]:
-    """Return the processor time (s) that a statement adds to a bare `import` of its module."""
-
-    def run(statement: str) -> float:
-        module, call = statement.split("; ")
-        code = f"{module}\nimport time\nstart = time.process_time()\n{call}\n"
-        code += "print(time.process_time() - start)"
-        times = []
-        for _ in range(3):
-            done = subprocess.run(
-                [sys.executable, "-c", code], check=True, capture_output=True, text=True
-            )
-            times.append(float(done.stdout))
-        return min(times)
-
-    return run
 
 
 def test_identity_pose_for_plain_numbers() -> None:

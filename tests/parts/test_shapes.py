@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import json
 import re
-import time
 from pathlib import Path
 
 import numpy as np
@@ -134,15 +133,6 @@ def test_unknown_detail_and_missing_shape_are_told() -> None:
     assert not has_shape(nameless)
     with pytest.raises(SchemaError, match="has no shape"):
         mesh(nameless)
-
-
-@pytest.mark.speed
-def test_a_beam_is_drawn_fast() -> None:
-    part = definition("32523")
-    mesh.cache_clear()
-    start = time.process_time()
-    mesh(part)
-    assert time.process_time() - start < 0.2
 
 
 @functools.cache

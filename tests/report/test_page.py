@@ -7,7 +7,6 @@ import gzip
 import hashlib
 import json
 import re
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -278,14 +277,6 @@ def test_size_for_4000_parts(tmp_path: Path) -> None:
     found, _ = contents(text)
     assert found["light"]
     assert all(shape["edges"]["length"] == 0 for shape in found["shapes"])
-
-
-@pytest.mark.speed
-def test_time_for_150_parts() -> None:
-    report = technic.analyze(technic.load(REPO / "technic" / "data" / "rolling_chassis.mpd"))
-    began = time.perf_counter()
-    page(report)
-    assert time.perf_counter() - began < 3.0
 
 
 def test_notebook_summary_escapes(pair: RigidityReport) -> None:

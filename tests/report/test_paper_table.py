@@ -8,9 +8,7 @@ from pathlib import Path
 
 import pytest
 
-import technic
 from technic.report.paper_table import paper_table, to_dict, to_text
-from technic.rigidity.analyze import analyze
 from tests.conftest import REPO
 
 GALLERY = REPO / "technic" / "data" / "gallery"
@@ -79,17 +77,3 @@ def test_text_and_json_say_the_same(table):
     json.dumps(data, allow_nan=False)
     assert "FAILS" not in text
     assert "n/a" in text
-
-
-@pytest.mark.speed
-@pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
-def test_small_models_take_less_than_the_paper(path: Path):
-    from time import perf_counter
-
-    assembly = technic.load(path)
-    best = float("inf")
-    for _ in range(3):
-        start = perf_counter()
-        analyze(assembly, modes=1)
-        best = min(best, perf_counter() - start)
-    assert best < 0.9
