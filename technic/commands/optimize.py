@@ -54,7 +54,8 @@ def optimize(
         float, typer.Option("--pin", min=0.0, metavar="MM", help="Diameter of pin holes.")
     ] = 1.0,
     shortest: Annotated[
-        float, typer.Option("--shortest", metavar="SHARE", help="Least length of a bar, of its own.")
+        float,
+        typer.Option("--shortest", metavar="SHARE", help="Least length of a bar, of its own."),
     ] = 0.5,
     longest: Annotated[
         float, typer.Option("--longest", metavar="SHARE", help="Greatest length of a bar.")

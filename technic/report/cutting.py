@@ -154,8 +154,10 @@ def write_cut(assembly: Assembly, path: Path, pin: float) -> None:
 
 def _svg(placed: list[tuple[Blank, Array]], wide: float, high: float, hole: float) -> str:
     out = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{wide:.3f}mm" height="{high:.3f}mm" '
-        f'viewBox="0 0 {wide:.3f} {high:.3f}" fill="none" stroke="red" stroke-width="0.1">'
+        (
+            f'<svg xmlns="http://www.w3.org/2000/svg" width="{wide:.3f}mm" height="{high:.3f}mm" '
+            f'viewBox="0 0 {wide:.3f} {high:.3f}" fill="none" stroke="red" stroke-width="0.1">'
+        )
     ]
     for blank, shift in placed:
         edge = outline(blank) + shift

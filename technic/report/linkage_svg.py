@@ -40,8 +40,10 @@ def comparison_svg(found: Optimization) -> str:
     places = at(flat)
     thick = max(2.0, 0.6 * scale * 0.003)
     out = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH:.0f}" height="{height:.0f}" '
-        f'viewBox="0 0 {WIDTH:.0f} {height:.0f}" font-family="sans-serif" font-size="14">',
+        (
+            f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH:.0f}" height="{height:.0f}" '
+            f'viewBox="0 0 {WIDTH:.0f} {height:.0f}" font-family="sans-serif" font-size="14">'
+        ),
         f"<title>{escape(found.before.name)}: before and after</title>",
         f'<rect width="{WIDTH:.0f}" height="{height:.0f}" fill="white"/>',
     ]
@@ -62,7 +64,9 @@ def comparison_svg(found: Optimization) -> str:
         fill = INK if v in found.geometry.pinned else "white"
         out.append(f'<circle cx="{x:.2f}" cy="{y:.2f}" r="4" fill="{fill}" stroke="{INK}"/>')
         name = escape(found.geometry.names[v])
-        out.append(f'<text x="{x + 6:.1f}" y="{y - 6:.1f}" fill="{INK}" font-size="11">{name}</text>')
+        out.append(
+            f'<text x="{x + 6:.1f}" y="{y - 6:.1f}" fill="{INK}" font-size="11">{name}</text>'
+        )
     said = (
         f"dashed: before, {number(found.start.rigidity)} N/m; solid: after, "
         f"{number(found.end.rigidity)} N/m ({number(found.factor)} times)"
@@ -76,6 +80,9 @@ def _eye(positions: Array, dimension: int) -> Array:
     if dimension == 2:
         return np.eye(3)[:2]
     _, _, axes = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=False)
-    axes = axes[:2] * np.where(np.take_along_axis(
-        axes[:2], np.argmax(np.abs(axes[:2]), axis=1)[:, None], axis=1) < 0, -1.0, 1.0)
+    axes = axes[:2] * np.where(
+        np.take_along_axis(axes[:2], np.argmax(np.abs(axes[:2]), axis=1)[:, None], axis=1) < 0,
+        -1.0,
+        1.0,
+    )
     return np.asarray(axes)

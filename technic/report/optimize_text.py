@@ -33,11 +33,15 @@ def optimization_text(found: Optimization, style: Style) -> str:
     out = [
         style("bold", found.before.name),
         f"Rigidity   {style('good' if found.factor > 1.0 else 'warn', line)}",
-        f"Bars       {number(1e3 * start.edges)} -> {number(1e3 * end.edges)} mm in all "
-        f"({change:+.1f} %), {number(1e3 * start.mass)} -> {number(1e3 * end.mass)} g",
+        (
+            f"Bars       {number(1e3 * start.edges)} -> {number(1e3 * end.edges)} mm in all "
+            f"({change:+.1f} %), {number(1e3 * start.mass)} -> {number(1e3 * end.mass)} g"
+        ),
         f"Motions    {found.internal}, as before",
-        f"Search     {count(found.parameters, 'parameter')}, {count(found.evaluations, 'evaluation')}, "
-        f"{found.seconds:.1f} s: {_ENDS[found.status]}",
+        (
+            f"Search     {count(found.parameters, 'parameter')}, {count(found.evaluations, 'evaluation')}, "
+            f"{found.seconds:.1f} s: {_ENDS[found.status]}"
+        ),
         "",
         *vertex_table(found),
     ]

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
@@ -159,7 +160,7 @@ def _forces(model: Model, matrices: Matrices, values: Array, vectors: Array) -> 
         for _ in range(3):
             held += solve(rigid @ (rest - rigid.T @ held))
         forces[~model.elastic] = held
-    return forces
+    return np.asarray(forces)
 
 
 def _add_links(slopes: _Slopes, model: Model, positions: Array, full: Array, forces: Array) -> None:
@@ -244,7 +245,7 @@ def _add_arms(slopes: _Slopes, link: Any, sign: Array, push: Array, turn: Array)
         np.add.at(slopes.points[k], link, slope)
 
 
-def length_gradient(positions: Array, stretches: Array) -> tuple[Array, Array]:
+def length_gradient(positions: Array, stretches: NDArray[np.int64]) -> tuple[Array, Array]:
     """Return lengths of stretches (e,) and the unit vectors from their first to their second end."""
     spans = positions[stretches[:, 1]] - positions[stretches[:, 0]]
     lengths = np.linalg.norm(spans, axis=1)

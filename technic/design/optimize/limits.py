@@ -118,7 +118,9 @@ def limits_of(
     """
     geometry = model.geometry
     if not 0.0 < lengths[0] <= 1.0 <= lengths[1]:
-        raise UsageError("bounds of lengths are shares of the length at the start, such as 0.5 and 2")
+        raise UsageError(
+            "bounds of lengths are shares of the length at the start, such as 0.5 and 2"
+        )
     start = freedom.start
     stretches = geometry.stretches
     long, _ = length_gradient(start, stretches)

@@ -6,6 +6,7 @@ without meshing anew: which node hangs on which stretch, and where, never change
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from technic.assembly.shapes import make_shape
 from technic.design.optimize.vertices import Geometry
 from technic.errors import UsageError
 from technic.fem.frame import local_mass, local_stiffness, subdivide
-from technic.geometry import Array, shift_twist
+from technic.geometry import Array, shift_twist, turn_twist
 from technic.parts.definition import FrameBody, Material, Section, TrussBody
 from technic.system.assemble import System, assemble
 
@@ -204,11 +205,11 @@ class Model:
         self.node_dofs = np.array(node_dofs, dtype=np.int64).reshape(-1, 6)
         self.members = []
         for (section, material), rows in groups.items():
-            i = np.array([r[0] for r in rows], dtype=np.int64)
-            j = np.array([r[1] for r in rows], dtype=np.int64)
-            dofs = np.hstack([self.node_dofs[i], self.node_dofs[j]])
+            start_nodes = np.array([r[0] for r in rows], dtype=np.int64)
+            end_nodes = np.array([r[1] for r in rows], dtype=np.int64)
+            dofs = np.hstack([self.node_dofs[start_nodes], self.node_dofs[end_nodes]])
             normals = np.array([r[2] for r in rows])
-            self.members.append(Members(i, j, normals, section, material, dofs))
+            self.members.append(Members(start_nodes, end_nodes, normals, section, material, dofs))
         self.trusses = Trusses(
             np.array([r[0][0] for r in truss_rows], dtype=np.int64),
             np.array([r[0][1] for r in truss_rows], dtype=np.int64),
@@ -251,8 +252,6 @@ class Model:
                 else:
                     element = self.system.elements[p]
                     pose = self.assembly.parts[p].pose
-                    from technic.geometry import turn_twist
-
                     kinds["still"].append((k, sign, len(self.maps), 0.0, self.system.part_slice(p)))
                     self.maps.append(turn_twist(pose.rotation) @ element.frames[slot])
                     self.origins.append(pose.points(element.frame_points[slot]))
@@ -260,7 +259,7 @@ class Model:
         self.truss_sides = _sides(kinds["truss"], 7)
         self.still_sides = kinds["still"]
         starts = np.searchsorted(rows.link, np.arange(len(self.owners) + 1))
-        self.row_range = [(int(a), int(b)) for a, b in zip(starts, starts[1:], strict=False)]
+        self.row_range = [(int(a), int(b)) for a, b in itertools.pairwise(starts)]
         self.frame_scatter = self._scatter(self.frame_sides)
         self.truss_scatter = self._scatter(self.truss_sides)
 

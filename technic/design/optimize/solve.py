@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 from scipy import optimize as scipy_optimize
@@ -200,9 +200,7 @@ class _Search:
             constraints={
                 "type": "ineq",
                 "fun": lambda y: limits.at(basis.positions(start + unit * y))[0],
-                "jac": lambda y: (
-                    unit * basis.pull(limits.at(basis.positions(start + unit * y))[1])
-                ),
+                "jac": lambda y: unit * basis.pull(limits.at(basis.positions(start + unit * y))[1]),
             },
             method="SLSQP",
             options={"maxiter": iterations, "ftol": 1e-7},
@@ -309,9 +307,7 @@ def optimize(
         clearance=clearance,
         max_mass=max_mass,
     )
-    search = _Search(
-        objective, freed, limits, max_evaluations, began + max_seconds, progress
-    )
+    search = _Search(objective, freed, limits, max_evaluations, began + max_seconds, progress)
     random = np.random.default_rng(seed)
     status: Status = "converged"
     zero = np.zeros(freed.size)

@@ -8,11 +8,13 @@ stays where it is.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from technic.assembly.joint_types import JointType
@@ -66,11 +68,9 @@ class Geometry:
     slides: Mapping[int, Array]
 
     @property
-    def stretches(self) -> Array:
+    def stretches(self) -> NDArray[np.int64]:
         """Pairs of vertices that a bar joins, (e, 2), one per stretch of every bar."""
-        pairs = [
-            (a, b) for own in self.corners.values() for a, b in zip(own, own[1:], strict=False)
-        ]
+        pairs = [(a, b) for own in self.corners.values() for a, b in itertools.pairwise(own)]
         return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
     def index(self, name: str) -> int:
@@ -193,7 +193,7 @@ def find_geometry(assembly: Assembly, names: Mapping[str, Array] | None = None) 
                 "Use `technic suggest`, or describe the linkage in an assembly file"
             )
     lines = {k: p for k in range(len(assembly.parts)) if (p := bar_points(assembly, k)) is not None}
-    everything = [*lines.values(), *([j.point] for j in assembly.joints)]
+    everything = [*lines.values(), *(j.point[None] for j in assembly.joints)]
     size = float(np.ptp(np.vstack(everything), axis=0).max()) if everything else 1.0
     places = _Places(SAME * size)
     corners = {p: tuple(places.add(x) for x in points) for p, points in lines.items()}
@@ -260,7 +260,7 @@ def _stretch(
         return None
     points = lines[part]
     best: tuple[float, int, float] | None = None
-    for k, (p, q) in enumerate(zip(points, points[1:], strict=False)):
+    for k, (p, q) in enumerate(itertools.pairwise(points)):
         span = q - p
         t = float(np.clip((point - p) @ span / (span @ span), 0.0, 1.0))
         gap = float(np.linalg.norm(p + t * span - point))
@@ -376,7 +376,7 @@ def freedom(geometry: Geometry, rules: Sequence[Rule], dimension: int) -> Freedo
     for v, rule in enumerate(rules):
         if v in geometry.carried or rule.kind in ("fixed", "mirror"):
             continue
-        axes = np.eye(3)[:dimension] if rule.kind == "free" else np.atleast_2d(rule.direction)
+        axes = np.eye(3)[:dimension] if rule.direction is None else rule.direction[None]
         axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
         blocks[v] = []
         for axis in axes:
