@@ -81,9 +81,10 @@ def optimize(
     quiet: QuietOption = False,
 ) -> None:
     """Move the joints of a linkage so that it resists its worst load better, with little change."""
+    from technic.design.optimize.freedom import Rule
     from technic.design.optimize.rule_file import read_rules
     from technic.design.optimize.solve import optimize as solve
-    from technic.design.optimize.vertices import Rule, find_geometry
+    from technic.design.optimize.vertices import find_geometry
     from technic.loading import load, save
     from technic.report.files import check_writable, write_atomic
     from technic.report.json import STDOUT, write_json

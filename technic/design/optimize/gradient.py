@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from technic.design.optimize.moving import Matrices, Members, Model, turn_of
+from technic.design.optimize.moving import Model
+from technic.design.optimize.pieces import Matrices, Members, turn_of
 from technic.fem.frame import local_mass, local_stiffness
 from technic.geometry import Array
 

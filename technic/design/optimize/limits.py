@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from technic.design.optimize.freedom import Freedom
 from technic.design.optimize.gradient import length_gradient
 from technic.design.optimize.moving import Model
-from technic.design.optimize.vertices import Freedom
 from technic.errors import UsageError
 from technic.geometry import Array
 from technic.parts.definition import FrameBody, TrussBody

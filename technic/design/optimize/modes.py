@@ -14,7 +14,7 @@ import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from technic.design.optimize.moving import Matrices
+from technic.design.optimize.pieces import Matrices
 from technic.geometry import Array
 from technic.rigidity.eigen import elastic_modes
 from technic.system.inverse import orthonormal

@@ -7,17 +7,26 @@ without meshing anew: which node hangs on which stretch, and where, never change
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from technic.assembly.joint_types import JointType
 from technic.assembly.model import Assembly, Support
 from technic.assembly.shapes import make_shape
+from technic.design.optimize.pieces import (
+    Index,
+    Matrices,
+    Members,
+    Sides,
+    Trusses,
+    add_blocks,
+    sides_of,
+    turn_of,
+)
 from technic.design.optimize.vertices import Geometry
 from technic.errors import UsageError
 from technic.fem.frame import local_mass, local_stiffness, subdivide
@@ -25,88 +34,7 @@ from technic.geometry import Array, shift_twist, turn_twist
 from technic.parts.definition import FrameBody, Material, Section, TrussBody
 from technic.system.assemble import System, assemble
 
-__all__ = ["Matrices", "Members", "Model", "Sides", "moved", "turn_of"]
-
-Index = NDArray[np.int64]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Members:
-    """Frame elements of one section and material: nodes at both ends, unknowns (-1: held)."""
-
-    first: Index
-    last: Index
-    normals: Array
-    section: Section
-    material: Material
-    dofs: Index
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Trusses:
-    """Truss bars: vertices at both ends, unknowns (-1: held)."""
-
-    first: Index
-    last: Index
-    areas: Array
-    materials: tuple[Material, ...]
-    dofs: Index
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Sides:
-    """Sides of links on one kind of part.
-
-    Parameters
-    ----------
-    link : (s,) ndarray of int
-    sign : (s,) ndarray
-        1, or -1 for the second part of a joint.
-    owner : (s,) ndarray of int
-        Node of a frame, number of a truss bar, or number of a constant map.
-    share : (s,) ndarray
-        For truss bars: how far along the bar.
-    dofs : (s, n) ndarray of int
-    """
-
-    link: Index
-    sign: Array
-    owner: Index
-    share: Array
-    dofs: Index
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Matrices:
-    """Matrices at one set of positions.
-
-    Parameters
-    ----------
-    stiffness : (n, n) sparse
-        ``K + J``.
-    measure : (n, n) sparse
-        ``M``: mass matrix over the mass.
-    constraints : (c, n) sparse
-        Rows held rigidly.
-    rows : (r, n) sparse
-        All held motions, ``A``.
-    mass : float
-        kg.
-    """
-
-    stiffness: sparse.csr_array
-    measure: sparse.csr_array
-    constraints: sparse.csr_array
-    rows: sparse.csr_array
-    mass: float
-
-
-def turn_of(spans: Array, normals: Array) -> Array:
-    """Return members' own axes as rows, (m, 3, 3); spans may be complex."""
-    x = spans / np.sqrt(np.sum(spans * spans, axis=1))[:, None]
-    z = normals - np.sum(normals * x, axis=1)[:, None] * x
-    z = z / np.sqrt(np.sum(z * z, axis=1))[:, None]
-    return np.stack([x, np.cross(z, x), z], axis=1)
+__all__ = ["Model", "moved"]
 
 
 class Model:
@@ -255,8 +183,8 @@ class Model:
                     kinds["still"].append((k, sign, len(self.maps), 0.0, self.system.part_slice(p)))
                     self.maps.append(turn_twist(pose.rotation) @ element.frames[slot])
                     self.origins.append(pose.points(element.frame_points[slot]))
-        self.frame_sides = _sides(kinds["frame"], 6)
-        self.truss_sides = _sides(kinds["truss"], 7)
+        self.frame_sides = sides_of(kinds["frame"], 6)
+        self.truss_sides = sides_of(kinds["truss"], 7)
         self.still_sides = kinds["still"]
         starts = np.searchsorted(rows.link, np.arange(len(self.owners) + 1))
         self.row_range = [(int(a), int(b)) for a, b in itertools.pairwise(starts)]
@@ -392,8 +320,8 @@ class Model:
         rows = self.joint_rows(positions)
         soft = rows[self.elastic]
         joints = soft.T @ sparse.diags_array(self.springs[self.elastic]) @ soft
-        stiffness = _sum(stiff, self.size) + self.still_stiffness + joints
-        measure = (_sum(heavy, self.size) + self.still_mass) / mass
+        stiffness = add_blocks(stiff, self.size) + self.still_stiffness + joints
+        measure = (add_blocks(heavy, self.size) + self.still_mass) / mass
         return Matrices(
             sparse.csr_array(stiffness),
             sparse.csr_array(measure),
@@ -424,30 +352,6 @@ class Model:
                 about = self.system.R[own, 6 * p : 6 * p + 6].toarray()
                 out[own] = about @ shift_twist(part.centroid)
         return out
-
-
-def _sides(rows: list[Any], width: int) -> Sides:
-    return Sides(
-        np.array([r[0] for r in rows], dtype=np.int64),
-        np.array([r[1] for r in rows], dtype=float),
-        np.array([r[2] for r in rows], dtype=np.int64),
-        np.array([r[3] for r in rows], dtype=float),
-        np.array([r[4] for r in rows], dtype=np.int64).reshape(-1, width),
-    )
-
-
-def _sum(blocks: list[tuple[Array, Index]], size: int) -> sparse.csr_array:
-    """Add blocks at their unknowns."""
-    data, rows, columns = [np.zeros(0)], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
-    for values, dofs in blocks:
-        i = np.broadcast_to(dofs[:, :, None], values.shape)
-        j = np.broadcast_to(dofs[:, None, :], values.shape)
-        keep = (i >= 0) & (j >= 0) & (values != 0.0)
-        data.append(values[keep])
-        rows.append(i[keep])
-        columns.append(j[keep])
-    place = (np.concatenate(rows), np.concatenate(columns))
-    return sparse.csr_array((np.concatenate(data), place), shape=(size, size))
 
 
 def moved(model: Model, positions: Array) -> Assembly:

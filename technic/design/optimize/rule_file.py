@@ -19,7 +19,8 @@ from typing import Any, Final
 import numpy as np
 
 from technic.assembly.model import Assembly
-from technic.design.optimize.vertices import Rule, find_geometry
+from technic.design.optimize.freedom import Rule
+from technic.design.optimize.vertices import find_geometry
 from technic.errors import InputError, SchemaError
 from technic.geometry import Array
 

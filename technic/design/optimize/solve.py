@@ -16,17 +16,11 @@ import numpy as np
 from scipy import optimize as scipy_optimize
 
 from technic.assembly.model import Assembly
+from technic.design.optimize.freedom import Freedom, Rule, freedom, rules_of
 from technic.design.optimize.limits import Limits, limits_of
 from technic.design.optimize.moving import Model, moved
 from technic.design.optimize.objective import Motions, Objective, Point, spectrum
-from technic.design.optimize.vertices import (
-    Freedom,
-    Geometry,
-    Rule,
-    find_geometry,
-    freedom,
-    rules_of,
-)
+from technic.design.optimize.vertices import Geometry, find_geometry
 from technic.errors import NumericalError, UsageError
 from technic.geometry import Array
 from technic.system.inverse import single_thread

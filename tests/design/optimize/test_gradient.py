@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from technic.assembly.builder import Linkage
 from technic.assembly.model import Assembly
+from technic.design.optimize.freedom import freedom, rules_of
 from technic.design.optimize.moving import Model, moved
 from technic.design.optimize.objective import Motions, spectrum
-from technic.design.optimize.vertices import find_geometry, freedom, rules_of
+from technic.design.optimize.vertices import find_geometry
 from technic.loading import load
 from technic.system.assemble import assemble
 from tests.conftest import REPO

@@ -7,7 +7,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def test_command_writes_everything_that_was_asked_for(tmp_path: Path) -> None:
     assert after.value == pytest.approx(data["after"]["rigidity_n_per_m"], rel=1e-6)
     moved = [v for v in data["vertices"] if not np.allclose(v["from_m"], v["to_m"])]
     assert {p for v in moved for p in v["parts"]} == {"mast", "stay left", "stay right"}
-    picture = ElementTree.fromstring(svg.read_text())
+    picture = ET.fromstring(svg.read_text())
     assert len(picture.findall(f"{SVG}circle")) == 6
     assert cut.read_text().count("POLYLINE") == 5
     assert len(list((tmp_path / "stl").glob("*.stl"))) == 5
@@ -72,7 +72,7 @@ def test_bars_have_their_length_and_holes(tmp_path: Path) -> None:
     assert {b.id: b for b in blanks(assembly, 0.004)}["mast"].width == pytest.approx(6.0)
     sheet = tmp_path / "bars.svg"
     write_cut(assembly, sheet, 0.001)
-    root = ElementTree.fromstring(sheet.read_text())
+    root = ET.fromstring(sheet.read_text())
     groups = root.findall(f"{SVG}g")
     assert len(groups) == 5
     assert sum(len(g.findall(f"{SVG}circle")) for g in groups) == sum(

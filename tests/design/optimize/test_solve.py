@@ -9,11 +9,12 @@ import pytest
 
 from technic.assembly.model import Assembly
 from technic.assembly.writing import save_assembly
+from technic.design.optimize.freedom import Rule, freedom, rules_of
 from technic.design.optimize.moving import Model
 from technic.design.optimize.objective import Motions, spectrum
 from technic.design.optimize.rule_file import rules_from
 from technic.design.optimize.solve import Optimization, optimize
-from technic.design.optimize.vertices import Rule, find_geometry, freedom, rules_of
+from technic.design.optimize.vertices import find_geometry
 from technic.errors import SchemaError, UsageError
 from technic.loading import load
 from technic.rigidity.analyze import analyze
