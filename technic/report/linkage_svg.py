@@ -47,12 +47,15 @@ def comparison_svg(found: Optimization) -> str:
         f"<title>{escape(found.before.name)}: before and after</title>",
         f'<rect width="{WIDTH:.0f}" height="{height:.0f}" fill="white"/>',
     ]
-    for which, color, dash in ((0, BEFORE, ' stroke-dasharray="7 5"'), (-1, AFTER, "")):
+    for which, color, dash in (
+        (0, BEFORE, ' stroke-dasharray="12 8" stroke-opacity="0.8"'),
+        (-1, AFTER, ""),
+    ):
         for own in found.geometry.corners.values():
             line = " ".join(f"{x:.2f},{y:.2f}" for x, y in places[which][list(own)])
             out.append(
                 f'<polyline points="{line}" fill="none" stroke="{color}" '
-                f'stroke-width="{thick:.1f}" stroke-linecap="round"{dash}/>'
+                f'stroke-width="{thick:.1f}" stroke-linejoin="round"{dash}/>'
             )
     used = sorted({v for own in found.geometry.corners.values() for v in own})
     for v in used:
