@@ -9,6 +9,7 @@ from technic.assembly.model import Assembly, Joint, Part, Support
 from technic.geometry import Pose, axes_from
 from technic.parts.definition import FrameBody, MassProperties, Material, RigidBody, Section
 
+PLASTIC = Material("plastic", 2e9, 0.35, 1000.0, "round numbers")
 STEEL = Material("steel", 200e9, 0.3, 7800.0, "round numbers")
 
 

@@ -14,7 +14,7 @@ from technic.assembly.joint_types import JointType
 from technic.geometry import Pose
 from technic.rigidity.analyze import analyze
 from technic.system.assemble import assemble
-from tests.mechanics import assembly, beam, block, joint, moved
+from tests.mechanics import PLASTIC, assembly, beam, block, joint, moved
 
 
 def random_assembly(seed, parts):
@@ -26,7 +26,8 @@ def random_assembly(seed, parts):
         if rng.random() < 0.5:
             made.append(block(f"p{k}", at, rng.uniform(0.01, 0.1)))
         else:
-            made.append(beam(f"p{k}", at, at + rng.uniform(0.02, 0.1, 3), 0.004, stretch=0.03))
+            end = at + rng.uniform(0.02, 0.1, 3)
+            made.append(beam(f"p{k}", at, end, 0.004, material=PLASTIC, stretch=0.03))
     joints = []
     pairs = [(int(rng.integers(k)), k) for k in range(1, parts)]
     pairs += [
