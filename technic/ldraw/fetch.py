@@ -84,7 +84,7 @@ def fetch(
         What came is no parts library, or absurdly big; it is deleted.
     """
     if urllib.parse.urlsplit(url).scheme not in ("http", "https"):
-        raise UsageError(f"{url!r} is not a web address (https://...)")
+        raise UsageError(f"{url!r} is not a web address: it must begin with http or https")
     part = target.with_name(target.name + ".part")
     note = target.with_name(target.name + ".part.json")
     try:

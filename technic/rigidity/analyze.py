@@ -14,7 +14,7 @@ from scipy import sparse
 from technic.assembly.model import Assembly, FindingKind
 from technic.assembly.stiffness import StiffnessTable
 from technic.geometry import Array
-from technic.rigidity.eigen import elastic_modes, single_thread
+from technic.rigidity.eigen import elastic_modes
 from technic.rigidity.exact import lattice_rows, modular_rank
 from technic.rigidity.kinematics import (
     ComponentMotions,
@@ -36,6 +36,7 @@ from technic.rigidity.sentences import motion_sentence, not_modelled, reason
 from technic.rigidity.uncertainty import rigidity_interval
 from technic.rigidity.worst_case import mode_of, node_fields, rigid_parts, weak_spots
 from technic.system.assemble import ElementFactory, System, assemble, element_of, rigid_element_of
+from technic.system.inverse import single_thread
 from technic.system.part_models import models_of, solid_element_of
 from technic.tolerances import MAIN_COMPONENT_SHARE, MOBILITY_GAP
 
