@@ -288,6 +288,8 @@ def test_keyboard_reaches_everything(visit, pair: RigidityReport) -> None:
 
 
 def test_phone_width_needs_no_sideways_scrolling(visit, chassis: RigidityReport) -> None:
+    deep = {**chassis.assembly.source, "path": "/" + "a_folder_with_a_long_name/" * 6 + "model.mpd"}
+    chassis = replace(chassis, assembly=replace(chassis.assembly, source=deep))
     seen = visit(chassis, viewport={"width": 360, "height": 740}, has_touch=True, is_mobile=True)
     width = seen.page.evaluate("document.documentElement.scrollWidth")
     assert width <= 360
