@@ -10,33 +10,27 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from technic.commands.options import (
+    AS_FOUND,
     AnalysisOptions,
     AnimateOption,
-    AxleSlideOption,
-    CalibrationOption,
     CsvOption,
     FixOption,
-    GearsOption,
     GltfOption,
     HeatmapOption,
-    InnerOption,
     JsonOption,
-    LibraryOption,
     MeasureOption,
     MinRigidityOption,
+    ModelOptions,
     ModesOption,
-    NoLibraryOption,
-    OverridesOption,
     PartModelOption,
     PictureOption,
     QuietOption,
     ReportOption,
     RequireRigidOption,
-    ShadowOption,
     ViewOption,
 )
 from technic.commands.outputs import Outputs
-from technic.commands.reading import ModelOptions, reading
+from technic.commands.reading import model_options, reading
 
 if TYPE_CHECKING:
     from technic.rigidity.result import RigidityReport
@@ -91,15 +85,7 @@ def run(model: Path, options: AnalysisOptions) -> None:
 
     _check_targets(options)
     with Outputs(options) as outputs:
-        more = ModelOptions(
-            library=options.library,
-            no_library=options.no_library,
-            shadow=options.shadow,
-            gears=options.gears,
-            inner=options.inner,
-            overrides=options.overrides,
-        )
-        how = reading(model, options.axle_slide, options.calibration, more)
+        how = reading(model, options.how)
         assembly = load(model, **how)
         if options.fix:
             supports = tuple(parse_fix(assembly, text) for text in options.fix)
@@ -127,6 +113,7 @@ def run(model: Path, options: AnalysisOptions) -> None:
         raise typer.Exit(_BELOW_DEMAND)
 
 
+@model_options
 def analyze(
     model: Annotated[
         Path,
@@ -142,16 +129,9 @@ def analyze(
     view: ViewOption = "mode",
     fix: FixOption = None,
     measure: MeasureOption = "mean_square",
-    axle_slide: AxleSlideOption = "held",
-    calibration: CalibrationOption = None,
-    gears: GearsOption = "off",
-    inner: InnerOption = "held",
-    overrides: OverridesOption = None,
-    library: LibraryOption = None,
-    no_library: NoLibraryOption = False,
-    shadow: ShadowOption = None,
+    how: ModelOptions = AS_FOUND,
     modes: ModesOption = 6,
-    parts: PartModelOption = "frame",
+    parts: PartModelOption = "solid",
     require_rigid: RequireRigidOption = False,
     min_rigidity: MinRigidityOption = None,
     quiet: QuietOption = False,
@@ -170,14 +150,7 @@ def analyze(
             view=view,
             fix=tuple(fix or ()),
             measure=measure,
-            axle_slide=axle_slide,
-            calibration=calibration,
-            gears=gears,
-            inner=inner,
-            overrides=overrides,
-            library=library,
-            no_library=no_library,
-            shadow=shadow,
+            how=how,
             modes=modes,
             parts=parts,
             require_rigid=require_rigid,

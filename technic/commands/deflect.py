@@ -10,20 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from technic.commands.options import (
-    AxleSlideOption,
-    CalibrationOption,
+    AS_FOUND,
     FixOption,
-    GearsOption,
-    InnerOption,
     JsonOption,
-    LibraryOption,
-    NoLibraryOption,
-    OverridesOption,
+    ModelOptions,
     PartModelOption,
     QuietOption,
-    ShadowOption,
 )
-from technic.commands.reading import ModelOptions, reading
+from technic.commands.reading import model_options, reading
 from technic.errors import UsageError
 
 if TYPE_CHECKING:
@@ -50,6 +44,7 @@ def _down(assembly: Assembly, text: str | None, *, needed: bool) -> Array | None
     return None
 
 
+@model_options
 def deflect(
     model: Annotated[
         Path,
@@ -93,14 +88,7 @@ def deflect(
         ),
     ] = None,
     json: JsonOption = None,
-    axle_slide: AxleSlideOption = "held",
-    calibration: CalibrationOption = None,
-    gears: GearsOption = "off",
-    inner: InnerOption = "held",
-    overrides: OverridesOption = None,
-    library: LibraryOption = None,
-    no_library: NoLibraryOption = False,
-    shadow: ShadowOption = None,
+    how: ModelOptions = AS_FOUND,
     parts: PartModelOption = "frame",
     quiet: QuietOption = False,
 ) -> None:
@@ -120,16 +108,8 @@ def deflect(
         raise UsageError("nothing acts on the model; give --load, --hang or --gravity")
     if json is not None and json != STDOUT:
         check_writable(Path(json))
-    more = ModelOptions(
-        library=library,
-        no_library=no_library,
-        shadow=shadow,
-        gears=gears,
-        inner=inner,
-        overrides=overrides,
-    )
-    how = reading(model, axle_slide, calibration, more)
-    assembly = load_model(model, **how)
+    options = reading(model, how)
+    assembly = load_model(model, **options)
     supports = tuple(parse_fix(assembly, text) for text in fix or ())
     assembly = replace(assembly, supports=assembly.supports + supports)
     way = _down(assembly, down, needed=bool(hang or gravity))
@@ -141,12 +121,12 @@ def deflect(
     probes = tuple(parse_probe(assembly, text) for text in probe or ())
     answer = solve(assembly, tuple(loads), gravity=weight, probes=probes, element=FACTORIES[parts])
     intervals: tuple[tuple[float, float] | None, ...] = ()
-    if "table" in how:
+    if "table" in options:
         from technic.statics.uncertainty import displacement_interval
 
         points: tuple[Load | Probe, ...] = (*loads, *probes)
         intervals = tuple(
-            displacement_interval(answer, points, k, how["table"], FACTORIES[parts])
+            displacement_interval(answer, points, k, options["table"], FACTORIES[parts])
             for k in range(len(points))
         )
     case = StaticCase(answer, tuple(loads), probes, weight, intervals, models_of(assembly, parts))

@@ -8,33 +8,36 @@ import typer
 
 from technic.commands.analyze import run
 from technic.commands.options import (
+    AS_FOUND,
     AnalysisOptions,
-    AxleSlideOption,
     FixOption,
     JsonOption,
     MeasureOption,
     MinRigidityOption,
+    ModelOptions,
     ModesOption,
     PartModelOption,
     PictureOption,
     QuietOption,
     RequireRigidOption,
 )
+from technic.commands.reading import model_options
 
 __all__ = ["DEMO_PICTURE", "demo"]
 
 DEMO_PICTURE = Path("technic-demo.png")
 
 
+@model_options
 def demo(
     json: JsonOption = None,
     picture: PictureOption = None,
     no_picture: bool = typer.Option(False, "--no-picture", help="Do not draw."),
     fix: FixOption = None,
     measure: MeasureOption = "mean_square",
-    axle_slide: AxleSlideOption = "held",
+    how: ModelOptions = AS_FOUND,
     modes: ModesOption = 6,
-    parts: PartModelOption = "frame",
+    parts: PartModelOption = "solid",
     require_rigid: RequireRigidOption = False,
     min_rigidity: MinRigidityOption = None,
     quiet: QuietOption = False,
@@ -48,7 +51,7 @@ def demo(
         picture=drawing,
         fix=tuple(fix or ()),
         measure=measure,
-        axle_slide=axle_slide,
+        how=how,
         modes=modes,
         parts=parts,
         require_rigid=require_rigid,

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import typer
 
 __all__ = [
+    "AS_FOUND",
     "AnalysisOptions",
     "AnimateOption",
     "AxleSlide",
@@ -27,6 +28,7 @@ __all__ = [
     "Measure",
     "MeasureOption",
     "MinRigidityOption",
+    "ModelOptions",
     "ModesOption",
     "NoLibraryOption",
     "OverridesOption",
@@ -160,8 +162,8 @@ PartModelOption = Annotated[
     PartModel,
     typer.Option(
         "--parts",
-        help="solid: condensed solid models where they are shipped; frame: beams bend; "
-        "rigid: only joints give way.",
+        help="solid: condensed solid models, frame members where none is shipped; frame: beams "
+        "bend; rigid: only joints give way.",
     ),
 ]
 RequireRigidOption = Annotated[
@@ -180,6 +182,44 @@ QuietOption = Annotated[
 
 
 @dataclass(frozen=True, slots=True)
+class ModelOptions:
+    """How a model file is read: where unknown parts come from, what holds, and what moves.
+
+    Parameters
+    ----------
+    axle_slide : {"held", "free"}
+        Whether friction holds parts on the axles that they grip.
+    calibration : Path or None
+        Stiffness table to use instead of the shipped one.
+    gears : {"off", "on"}
+        Whether gears in mesh turn each other.
+    inner : {"held", "free"}
+        Whether motors and actuators hold their position.
+    overrides : Path or None
+        File of corrections.
+    library : Path or None
+        LDraw parts library; None: the one that is found in the usual places, if there is one.
+    no_library : bool
+        Do not look for one.
+    shadow : Path or None
+        LDCad shadow library.
+    """
+
+    axle_slide: AxleSlide = "held"
+    calibration: Path | None = None
+    gears: Gears = "off"
+    inner: InnerMotion = "held"
+    overrides: Path | None = None
+    library: Path | None = None
+    no_library: bool = False
+    shadow: Path | None = None
+
+
+AS_FOUND: Final = ModelOptions()
+"""Nothing asked for."""
+
+
+@dataclass(frozen=True, slots=True)
 class AnalysisOptions:
     """What the caller of `technic analyze` asked for."""
 
@@ -191,18 +231,11 @@ class AnalysisOptions:
     csv: Path | None = None
     animate: Path | None = None
     view: View = "mode"
+    how: ModelOptions = AS_FOUND
     fix: tuple[str, ...] = ()
     measure: Measure = "mean_square"
-    axle_slide: AxleSlide = "held"
-    calibration: Path | None = None
-    gears: Gears = "off"
-    inner: InnerMotion = "held"
-    overrides: Path | None = None
-    library: Path | None = None
-    no_library: bool = False
-    shadow: Path | None = None
     modes: int = 6
-    parts: PartModel = "frame"
+    parts: PartModel = "solid"
     require_rigid: bool = False
     min_rigidity: float | None = None
     quiet: bool = False

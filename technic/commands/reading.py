@@ -1,43 +1,76 @@
-"""Options that steer how a model file is read."""
+"""Options that steer how a model file is read; every command that reads one takes them from here.
+
+A command has one parameter ``how: ModelOptions`` and the decorator `model_options`, which gives it
+``--library``, ``--gears``, ``--overrides`` and the others in its place.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import partial
+import inspect
+from collections.abc import Callable
+from dataclasses import fields
+from functools import partial, wraps
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, get_type_hints
 
+from technic.commands.options import (
+    AxleSlideOption,
+    CalibrationOption,
+    GearsOption,
+    InnerOption,
+    LibraryOption,
+    ModelOptions,
+    NoLibraryOption,
+    OverridesOption,
+    ShadowOption,
+)
 from technic.errors import UsageError
 
-__all__ = ["ModelOptions", "reading"]
+__all__ = ["model_options", "reading"]
 
 
-@dataclass(frozen=True, slots=True)
-class ModelOptions:
-    """How a model file is read: where unknown parts come from, and what moves.
+_OPTIONS: Final[dict[str, Any]] = {
+    "axle_slide": AxleSlideOption,
+    "calibration": CalibrationOption,
+    "gears": GearsOption,
+    "inner": InnerOption,
+    "overrides": OverridesOption,
+    "library": LibraryOption,
+    "no_library": NoLibraryOption,
+    "shadow": ShadowOption,
+}
+"""The command-line option of each field of `ModelOptions`."""
 
-    Parameters
-    ----------
-    library : Path or None
-        LDraw parts library; None: the one that is found in the usual places, if there is one.
-    no_library : bool
-        Do not look for one.
-    shadow : Path or None
-        LDCad shadow library.
-    gears : {"off", "on"}
-        Whether gears in mesh turn each other.
-    inner : {"held", "free"}
-        Whether motors and actuators hold their position.
-    overrides : Path or None
-        File of corrections.
-    """
 
-    library: Path | None = None
-    no_library: bool = False
-    shadow: Path | None = None
-    gears: Literal["off", "on"] = "off"
-    inner: Literal["held", "free"] = "held"
-    overrides: Path | None = None
+def model_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of `ModelOptions` in place of its parameter ``how``."""
+
+    @wraps(command)
+    def run(**given: Any) -> None:
+        chosen = {name: given.pop(name) for name in _OPTIONS if name in given}
+        command(how=ModelOptions(**chosen), **given)
+
+    hints = get_type_hints(command, include_extras=True)
+    parameters = []
+    for name, parameter in inspect.signature(command).parameters.items():
+        if name == "how":
+            parameters += [
+                inspect.Parameter(
+                    field.name,
+                    inspect.Parameter.KEYWORD_ONLY,
+                    default=field.default,
+                    annotation=_OPTIONS[field.name],
+                )
+                for field in fields(ModelOptions)
+            ]
+        else:
+            parameters.append(
+                parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=hints[name])
+            )
+    signature = inspect.Signature(parameters)
+    run.__annotations__ = {p.name: p.annotation for p in parameters}
+    run.__signature__ = signature  # type: ignore[attr-defined]
+    return run
 
 
 def _sources(options: ModelOptions) -> dict[str, Any]:
@@ -65,21 +98,13 @@ def _sources(options: ModelOptions) -> dict[str, Any]:
     return {"library": find_library, "shadow": partial(find_shadow, options.shadow)}
 
 
-def reading(
-    model: Path,
-    axle_slide: str,
-    calibration: Path | None = None,
-    more: ModelOptions | None = None,
-) -> dict[str, Any]:
+def reading(model: Path, how: ModelOptions) -> dict[str, Any]:
     """Return the options of the reader; an assembly file says itself what its joints hold.
 
     Parameters
     ----------
     model : Path
-    axle_slide : {"held", "free"}
-    calibration : Path, optional
-        Stiffness table to use instead of the shipped one.
-    more : ModelOptions, optional
+    how : ModelOptions
 
     Raises
     ------
@@ -89,25 +114,26 @@ def reading(
         The stiffness table cannot be read.
     """
     if model.suffix.lower() == ".json":
-        if axle_slide != "held":
+        if how.axle_slide != "held":
             raise UsageError("--axle-slide is for LDraw models; an assembly file types its joints")
-        if calibration is not None:
+        if how.calibration is not None:
             raise UsageError(
                 "--calibration is for LDraw models; an assembly file gives its own stiffnesses"
             )
-        if more is not None and more != ModelOptions():
+        if how != ModelOptions(no_library=how.no_library):
             raise UsageError(
                 "--library, --shadow, --gears, --inner and --overrides are for LDraw models"
             )
         return {}
-    options: dict[str, Any] = {"axle_slide": axle_slide}
-    more = more or ModelOptions()
-    options |= _sources(more)
-    options["gears"] = more.gears
-    options["inner"] = more.inner
-    options["overrides"] = more.overrides
-    if calibration is not None:
+    options: dict[str, Any] = {
+        "axle_slide": how.axle_slide,
+        "gears": how.gears,
+        "inner": how.inner,
+        "overrides": how.overrides,
+        **_sources(how),
+    }
+    if how.calibration is not None:
         from technic.assembly.stiffness import read_table
 
-        options["table"] = read_table(calibration)
+        options["table"] = read_table(how.calibration)
     return options

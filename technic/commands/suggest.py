@@ -12,16 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from technic.commands.options import (
-    AxleSlideOption,
-    CalibrationOption,
+    AS_FOUND,
     JsonOption,
-    LibraryOption,
-    NoLibraryOption,
+    ModelOptions,
     PictureOption,
     QuietOption,
-    ShadowOption,
 )
-from technic.commands.reading import ModelOptions, reading
+from technic.commands.reading import model_options, reading
 from technic.errors import UsageError
 
 if TYPE_CHECKING:
@@ -135,6 +132,7 @@ def _draw(
         painter.close()
 
 
+@model_options
 def suggest(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="LDraw file (.ldr, .mpd).")],
     json: JsonOption = None,
@@ -214,11 +212,7 @@ def suggest(
     pair: Annotated[
         bool, typer.Option("--pair", help="With --apply: write it and its twin on the other side.")
     ] = False,
-    axle_slide: AxleSlideOption = "held",
-    calibration: CalibrationOption = None,
-    library: LibraryOption = None,
-    no_library: NoLibraryOption = False,
-    shadow: ShadowOption = None,
+    how: ModelOptions = AS_FOUND,
     quiet: QuietOption = False,
 ) -> None:
     """Say which real beam makes a model more rigid, and write the model with it."""
@@ -238,8 +232,7 @@ def suggest(
             check_writable(path)
     if model.suffix.lower() == ".json":
         raise UsageError("suggestions are made of LEGO parts: give an LDraw model (.ldr, .mpd)")
-    more = ModelOptions(library=library, no_library=no_library, shadow=shadow)
-    options = reading(model, axle_slide, calibration, more)
+    options = reading(model, how)
     assembly = load(model, **options)
     joining = {key: options[key] for key in ("axle_slide", "table") if key in options}
     wishes = _Wishes(
