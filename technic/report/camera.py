@@ -11,7 +11,7 @@ from technic.assembly.model import Assembly
 from technic.geometry import Array
 from technic.report.scene import Camera
 
-__all__ = ["VIEWS", "View", "fit", "fixed_direction", "model_axes", "view_direction"]
+__all__ = ["VIEWS", "View", "fit", "fixed_direction", "model_axes", "sight", "view_direction"]
 
 View = Literal["iso", "front", "side", "top", "mode"]
 """Names of views; `mode` is the one that shows the worst mode best."""
@@ -95,6 +95,34 @@ def model_axes(assembly: Assembly) -> Array:
     if assembly.dimension == 2:
         return np.diag([1.0, -1.0, -1.0])
     return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+
+
+def sight(
+    assembly: Assembly,
+    points: Array,
+    *,
+    view: View = "mode",
+    movement: Array | None = None,
+    aspect: float = 1.5,
+) -> tuple[Array, Array]:
+    """Return where to look at a model from, and what is up: (toward, up), in its own axes.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        Says which way is up; a plane one is looked at square on, whatever the view.
+    points : (n, 3) ndarray
+    view : {"iso", "front", "side", "top", "mode"}
+    movement, aspect
+        For "mode", see `view_direction`.
+    """
+    axes = model_axes(assembly)
+    toward = fixed_direction("front" if assembly.dimension == 2 else view)
+    if toward is None:
+        toward = view_direction(
+            points @ axes, None if movement is None else movement @ axes, aspect
+        )
+    return axes @ toward, axes @ np.array([0.0, -1.0, 0.0])
 
 
 def fit(points: Array, toward: Array, up: Array | None = None) -> Camera:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from technic.report.camera import View, fit, fixed_direction, view_direction
+from technic.report.camera import View, fit, sight
 from technic.report.drawing import (
     Drawing,
     deformation_scale,
@@ -37,7 +37,9 @@ def _scale(reports: Sequence[RigidityReport], drawings: Sequence[Drawing]) -> fl
     return min(scales, default=0.0)
 
 
-def _layers(report: RigidityReport, drawing: Drawing, scale: float) -> tuple[Surface, Lines, str]:
+def _layers(
+    report: RigidityReport, drawing: Drawing, scale: float
+) -> tuple[tuple[Surface, ...], Lines, str]:
     load = unit_load(report)
     if load is None or scale == 0.0:
         body, edges = model_layers(drawing, drawing.points)
@@ -63,16 +65,19 @@ def comparison_scene(
     """
     drawings = [drawing_of(report.assembly) for report in reports]
     scale = _scale(reports, drawings)
-    toward = fixed_direction(view)
-    if toward is None:
-        field = worst_field(reports[0])
-        movement = None if field is None else field.displacements
-        toward = view_direction(np.concatenate(drawings[0].points), movement, 1.0)
+    field = worst_field(reports[0])
+    toward, up = sight(
+        reports[0].assembly,
+        np.concatenate(drawings[0].points),
+        view=view,
+        movement=None if field is None else field.displacements,
+        aspect=1.0,
+    )
     found = [
         _layers(report, drawing, scale) for report, drawing in zip(reports, drawings, strict=True)
     ]
-    extent = [body.points for body, _, _ in found]
-    camera = fit(np.concatenate([*extent, *(p for d in drawings for p in d.points)]), toward)
+    extent = [surface.points for body, _, _ in found for surface in body]
+    camera = fit(np.concatenate([*extent, *(p for d in drawings for p in d.points)]), toward, up)
     panels, legend = [], []
     for report, drawing, caption, (body, edges, words) in zip(
         reports, drawings, captions, found, strict=True
@@ -80,7 +85,7 @@ def comparison_scene(
         value = "" if report.rigidity is None else f", {number(report.rigidity.value)} N/m"
         said = f"{caption}: {report.verdict.value}{value}"
         still = outline(drawing, drawing.points)
-        panels.append(Panel(said, (body,), (edges, still), camera))
+        panels.append(Panel(said, body, (edges, still), camera))
         legend.append(LegendItem("none", NEUTRAL, f"{caption}: {len(drawing.points)} parts{words}"))
     drawn = f"worst-case load of 1 N each, deformations drawn {scale:g} x" if scale else ""
     return Scene(reports[0].assembly.name, drawn, tuple(panels), tuple(legend), (1600, 900))

@@ -20,6 +20,7 @@ from technic.rigidity.sentences import not_modelled
 from technic.rigidity.serialize import joint_stiffness
 from technic.statics.solve import Deflection, Load
 from technic.system.assemble import Probe
+from technic.system.part_models import PlainPart
 from technic.units import MM
 
 __all__ = ["SCHEMA", "StaticCase", "deflection_dict", "deflection_text"]
@@ -49,6 +50,8 @@ class StaticCase:
         95 % interval (m) of how far each loaded or probed point goes; empty when nothing was measured.
     part_models : mapping of str to int
         How many parts were modelled as "solid", "frame" and "rigid".
+    plain_parts : tuple of PlainPart
+        The kinds of part without a solid model, when solid models were asked for.
     """
 
     deflection: Deflection
@@ -57,6 +60,7 @@ class StaticCase:
     gravity: Array | None = None
     intervals: tuple[tuple[float, float] | None, ...] = ()
     part_models: Mapping[str, int] = field(default_factory=dict)
+    plain_parts: tuple[PlainPart, ...] = ()
 
     @property
     def assembly(self) -> Assembly:
@@ -94,6 +98,7 @@ def deflection_dict(case: StaticCase) -> dict[str, Any]:
             "dof": answer.system.size,
             "mass_kg": answer.system.mass,
             "part_models": dict(case.part_models),
+            "plain_parts": [plain.to_dict() for plain in case.plain_parts],
             "unknown_parts": [
                 {"id": u.number, "count": u.count, "lines": list(u.lines)} for u in assembly.unknown
             ],

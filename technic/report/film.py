@@ -9,7 +9,7 @@ import numpy as np
 
 from technic.errors import UsageError
 from technic.geometry import Array
-from technic.report.camera import View, fit, fixed_direction, view_direction
+from technic.report.camera import View, fit, sight
 from technic.report.carried import carried_twists
 from technic.report.deform import move_rigidly
 from technic.report.drawing import (
@@ -96,18 +96,17 @@ def film(report: RigidityReport, *, drawing: Drawing | None = None, view: View =
     half = _FRAMES // 2
     frames = [poses(cos(2.0 * pi * k / _FRAMES)) for k in range(half + 1)]
     field = worst_field(report)
-    toward = fixed_direction(view)
-    if toward is None:
-        everything = np.concatenate(drawing.points)
-        toward = view_direction(everything, None if field is None else field.displacements)
+    movement = None if field is None else field.displacements
+    everything = np.concatenate(drawing.points)
+    toward, up = sight(report.assembly, everything, view=view, movement=movement)
     # The camera sees all frames, so that it can stand still.
-    camera = fit(np.concatenate([*frames[0], *frames[-1], *drawing.points]), toward)
+    camera = fit(np.concatenate([*frames[0], *frames[-1], *drawing.points]), toward, up)
     still = outline(drawing, drawing.points)
     title, subtitle = headline(report)
     scenes = []
     for points in frames:
         body, edges = model_layers(drawing, points)
-        panel = Panel("", (body,), (edges, still), camera)
+        panel = Panel("", body, (edges, still), camera)
         scenes.append(Scene(title, subtitle, (panel,), (words,), _SIZE))
     order = (*range(half + 1), *range(half - 1, 0, -1))
     return Film(tuple(scenes), order, _SECONDS)

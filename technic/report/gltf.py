@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from technic.geometry import Array
+from technic.report.camera import model_axes
 from technic.report.drawing import (
     Drawing,
     deformation_scale,
@@ -27,7 +28,7 @@ from technic.report.drawing import (
 )
 from technic.report.energy import energy_shares
 from technic.report.files import write_bytes
-from technic.report.palette import color_rgb
+from technic.report.palette import color_alpha, color_rgb
 from technic.rigidity.result import RigidityReport
 from technic.rigidity.serialize import unit_load
 
@@ -82,10 +83,11 @@ def _linear(value: float) -> float:
 
 
 def _material(color: int | None) -> dict[str, Any]:
-    return {
+    alpha = color_alpha(color)
+    return ({"alphaMode": "BLEND"} if alpha < 1.0 else {}) | {
         "name": "no colour" if color is None else f"LDraw {color}",
         "pbrMetallicRoughness": {
-            "baseColorFactor": [*(_linear(v) for v in color_rgb(color)), 1.0],
+            "baseColorFactor": [*(_linear(v) for v in color_rgb(color)), alpha],
             "metallicFactor": 0.0,
             "roughnessFactor": 0.6,
         },
@@ -93,10 +95,10 @@ def _material(color: int | None) -> dict[str, Any]:
     }
 
 
-def _matrix(rotation: Array, translation: Array) -> list[float]:
-    """Return the 4 x 4 matrix of a node, column by column."""
+def _matrix(turn: Array, rotation: Array, translation: Array) -> list[float]:
+    """Return the 4 x 4 matrix of a node, turned, column by column."""
     matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = _TURN @ rotation, _TURN @ translation
+    matrix[:3, :3], matrix[:3, 3] = turn @ rotation, turn @ translation
     return [float(v) + 0.0 for v in matrix.T.ravel()]
 
 
@@ -137,6 +139,7 @@ def gltf(report: RigidityReport, drawing: Drawing | None = None) -> bytes:
     import technic
 
     drawing = drawing_of(report.assembly) if drawing is None else drawing
+    turn = _TURN @ model_axes(report.assembly).T
     buffer = _Buffer()
     scale, moved = _moved(report, drawing)
     shapes: dict[int, tuple[int, int]] = {}
@@ -168,7 +171,7 @@ def gltf(report: RigidityReport, drawing: Drawing | None = None) -> bytes:
             {
                 "name": part.id,
                 "mesh": k,
-                "matrix": _matrix(part.pose.rotation, part.pose.translation),
+                "matrix": _matrix(turn, part.pose.rotation, part.pose.translation),
                 "extras": {"part_number": part.number, "energy_share": float(energy[k])},
             }
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from technic.ldraw.colors import color_of
 from technic.report.scene import RGB
 
-__all__ = ["NEUTRAL", "color_name", "color_rgb"]
+__all__ = ["NEUTRAL", "color_alpha", "color_name", "color_rgb"]
 
 NEUTRAL: RGB = (0.62, 0.64, 0.66)
 """For parts without a colour."""
@@ -18,6 +18,15 @@ def color_name(code: int | None) -> str:
     ('red', '', '#ff8000')
     """
     return "" if code is None else color_of(code).name.lower()
+
+
+def color_alpha(code: int | None) -> float:
+    """Return how opaque a colour is: 1, less for glass-like ones.
+
+    >>> color_alpha(4), color_alpha(47) < 0.6
+    (1.0, True)
+    """
+    return 1.0 if code is None else color_of(code).rgba[3]
 
 
 def color_rgb(code: int | None) -> RGB:

@@ -11,7 +11,7 @@ import numpy as np
 from technic.geometry import Array
 from technic.parts.definition import PartDefinition
 from technic.report.arrows import arrow
-from technic.report.camera import View, fit, fixed_direction, model_axes, view_direction
+from technic.report.camera import View, fit, sight, view_direction
 from technic.report.drawing import (
     Drawing,
     deformation_scale,
@@ -21,7 +21,7 @@ from technic.report.drawing import (
 )
 from technic.report.load_arrows import LOAD_COLOR, load_arrows
 from technic.report.motion_picture import MOTION_COLOR, motion_layers
-from technic.report.palette import NEUTRAL, color_rgb
+from technic.report.palette import NEUTRAL, color_alpha, color_rgb
 from technic.report.scene import (
     RGB,
     LegendItem,
@@ -63,8 +63,8 @@ def _edge_color(color: RGB) -> RGB:
 
 def model_layers(
     drawing: Drawing, points: tuple[Array, ...], *, pale: float = 0.0
-) -> tuple[Surface, Lines]:
-    """Return the model in its colours, with its edges, at the given points.
+) -> tuple[tuple[Surface, ...], Lines]:
+    """Return the model in its colours, opaque parts before glass-like ones, and its edges.
 
     Parameters
     ----------
@@ -75,18 +75,29 @@ def model_layers(
         0 for full colours, 1 for white.
     """
     # Edges keep their strength: they carry the shape when the colours are pale.
-    surfaces, edges, edge_colors, start = [], [], [], 0
+    surfaces: dict[float, list[Surface]] = {1.0: []}
+    edges, edge_colors, start = [], [], 0
     for part, solid, where in zip(drawing.assembly.parts, drawing.solids, points, strict=True):
         full = np.array(color_rgb(part.color))
         color = full + pale * (1.0 - full)
         faces = solid.faces[:, ::-1] if np.linalg.det(part.pose.rotation) < 0 else solid.faces
-        surfaces.append(Surface(where, faces, np.tile(color, (len(where), 1))))
+        surfaces.setdefault(color_alpha(part.color), []).append(
+            Surface(where, faces, np.tile(color, (len(where), 1)))
+        )
         line = np.array(_edge_color(color_rgb(part.color)))
         edges.append(solid.edges + start)
         edge_colors.append(np.tile(line, (len(where), 1)))
         start += len(where)
-    body = merge(surfaces)
-    return body, Lines(body.points, np.concatenate(edges), np.concatenate(edge_colors), width=1.3)
+    body = tuple(merge(those, opacity=alpha) for alpha, those in surfaces.items() if those)
+    everything = np.concatenate([np.zeros((0, 3)), *points])
+    none = np.zeros((0, 2), dtype=np.int64)
+    lines = Lines(
+        everything,
+        np.concatenate([none, *edges]),
+        np.concatenate([np.zeros((0, 3)), *edge_colors]),
+        width=1.3,
+    )
+    return body, lines
 
 
 def outline(drawing: Drawing, points: tuple[Array, ...]) -> Lines:
@@ -149,7 +160,7 @@ def _elastic_panel(
     moved = deformed_points(report, drawing, twists, scale)
     body, edges = model_layers(drawing, moved)
     arrows, largest = load_arrows(report, drawing, field, scale)
-    surfaces = (body,) if arrows is None else (body, arrows)
+    surfaces = body if arrows is None else (*body, arrows)
     extent = np.concatenate([*drawing.points, *(surface.points for surface in surfaces)])
     panel = Panel(
         f"How it gives way (deformation x {scale:g})",
@@ -205,21 +216,18 @@ def report_scene(
     movement = None if field is None else field.displacements
     moving = motion_layers(report, drawing.points, drawing.solids, drawing.diagonal)
     side_by_side = moving is not None and field is not None
-    toward = fixed_direction(view)
-    axes = model_axes(report.assembly)
-    if report.assembly.dimension == 2:
-        toward = fixed_direction("front")  # a plane model is looked at square on
-    if toward is None:
-        aspect = _HALF_ASPECT if side_by_side else _WHOLE_ASPECT
-        seen = None if movement is None else movement @ axes
-        toward = view_direction(np.concatenate(drawing.points) @ axes, seen, aspect)
-    toward = axes @ toward
-    up = axes @ np.array([0.0, -1.0, 0.0])
+    toward, up = sight(
+        report.assembly,
+        np.concatenate(drawing.points),
+        view=view,
+        movement=movement,
+        aspect=_HALF_ASPECT if side_by_side else _WHOLE_ASPECT,
+    )
     panels: list[Panel] = []
     legend: list[LegendItem] = []
     if moving is not None:
         body, edges = model_layers(drawing, drawing.points, pale=0.25)
-        surfaces = (body, *moving.surfaces)
+        surfaces = (*body, *moving.surfaces)
         extent = np.concatenate([s.points for s in surfaces] + [moving.lines.points])
         panels.append(
             Panel(moving.caption, surfaces, (edges, moving.lines), fit(extent, toward, up))
@@ -231,7 +239,8 @@ def report_scene(
         legend += elastic[1]
     if not panels:
         body, edges = model_layers(drawing, drawing.points)
-        panels.append(Panel("", (body,), (edges,), fit(body.points, toward, up)))
+        camera = fit(np.concatenate(drawing.points), toward, up)
+        panels.append(Panel("", body, (edges,), camera))
     stand_ins = sum(solid.stand_in for solid in drawing.solids)
     if stand_ins:
         legend.append(

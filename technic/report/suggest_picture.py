@@ -57,10 +57,13 @@ def _panel(caption: str, assembly: Assembly, new: frozenset[int], camera: Camera
     if new:
         added = tuple(p for k, p in enumerate(assembly.parts) if k in new)
         layers.append(_layers(assembly, added, 0.0))
-    return Panel(caption, tuple(s for s, _ in layers), tuple(e for _, e in layers), camera)
+    surfaces = tuple(surface for body, _ in layers for surface in body)
+    return Panel(caption, surfaces, tuple(e for _, e in layers), camera)
 
 
-def _layers(assembly: Assembly, parts: tuple[Part, ...], pale: float) -> tuple[Surface, Lines]:
+def _layers(
+    assembly: Assembly, parts: tuple[Part, ...], pale: float
+) -> tuple[tuple[Surface, ...], Lines]:
     drawing = drawing_of(replace(assembly, parts=parts, joints=(), findings=(), supports=()))
     return model_layers(drawing, drawing.points, pale=pale)
 
