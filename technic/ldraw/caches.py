@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from technic.ldraw.storage import cache_folder
+from technic.folders import cache_folder
 
 __all__ = ["Cache", "caches", "clear"]
 

@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from technic.errors import InputError, MissingDependency, UsageError
-from technic.ldraw.storage import MAX_FILES, MAX_RATIO, data_folder
+from technic.folders import data_folder
+from technic.ldraw.storage import MAX_FILES, MAX_RATIO
 
 __all__ = ["DEFAULT_URL", "Fetched", "fetch", "library_target", "library_url"]
 

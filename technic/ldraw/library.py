@@ -21,8 +21,9 @@ from typing import Final
 import numpy as np
 
 from technic.errors import InputError, MissingDependency
+from technic.folders import data_folder
 from technic.geometry import Array, readonly
-from technic.ldraw.storage import Store, data_folder, open_store
+from technic.ldraw.storage import Store, open_store
 
 __all__ = [
     "LIBRARY_FAMILY",

@@ -19,8 +19,9 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from technic.errors import InputError
+from technic.folders import cache_folder
 
-__all__ = ["FolderStore", "Store", "ZipStore", "cache_folder", "data_folder", "open_store"]
+__all__ = ["FolderStore", "Store", "ZipStore", "open_store"]
 
 MAX_FILE: Final = 32 * 2**20
 """Largest file that is read (bytes); the largest official part has 3 MB."""
@@ -56,26 +57,6 @@ class Store(Protocol):
     def release(self) -> str:
         """Return the newest release named by the files, e.g. ``"2026-02"``, or ``""``."""
         ...
-
-
-def cache_folder() -> Path:
-    """Return the folder for cached data: ``TECHNIC_CACHE`` or the user's cache folder."""
-    explicit = os.environ.get("TECHNIC_CACHE")
-    if explicit:
-        return Path(explicit)
-    import platformdirs
-
-    return Path(platformdirs.user_cache_dir("technic-rigidity", appauthor=False))
-
-
-def data_folder() -> Path:
-    """Return the folder for data that the user fetched: ``TECHNIC_DATA`` or the user's data folder."""
-    explicit = os.environ.get("TECHNIC_DATA")
-    if explicit:
-        return Path(explicit)
-    import platformdirs
-
-    return Path(platformdirs.user_data_dir("technic-rigidity", appauthor=False))
 
 
 def open_store(path: Path) -> Store:

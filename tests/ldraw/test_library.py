@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from technic.errors import InputError, MissingDependency
+from technic.folders import cache_folder
 from technic.ldraw.library import Library, candidate_folders, find_library, reference_key
 from technic.ldraw.primitives import ports_from_primitives
-from technic.ldraw.storage import ZipStore, cache_folder
+from technic.ldraw.storage import ZipStore
 from tests.ldraw.small_library import files_with, line, part, there, write_folder, write_zip
 
 
