@@ -4,10 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
-
 __all__ = ["connected_groups"]
 
 
@@ -28,13 +24,19 @@ def connected_groups(
     >>> connected_groups([7, 3, 5, 4], [(3, 5), (7, 7)])
     [(3, 5), (4,), (7,)]
     """
-    order = sorted(members)
-    place = {m: k for k, m in enumerate(order)}
-    pairs = np.array([(place[a], place[b]) for a, b in edges], dtype=np.int64).reshape(-1, 2)
-    shape = (len(order), len(order))
-    graph = sparse.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=shape)
-    _, labels = connected_components(graph, directed=False)
+    heads = {m: m for m in sorted(members)}
+
+    def head(member: int) -> int:
+        while heads[member] != member:
+            # every visit halves the way for the next
+            heads[member] = member = heads[heads[member]]
+        return member
+
+    for a, b in edges:
+        first, second = head(a), head(b)
+        if first != second:
+            heads[max(first, second)] = min(first, second)
     groups: dict[int, list[int]] = {}
-    for member, label in zip(order, labels, strict=True):
-        groups.setdefault(int(label), []).append(member)
-    return sorted(tuple(g) for g in groups.values())
+    for member in heads:
+        groups.setdefault(head(member), []).append(member)
+    return [tuple(g) for g in groups.values()]

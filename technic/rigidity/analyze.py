@@ -35,21 +35,14 @@ from technic.rigidity.result import (
 from technic.rigidity.sentences import motion_sentence, not_modelled, reason
 from technic.rigidity.uncertainty import rigidity_interval
 from technic.rigidity.worst_case import mode_of, node_fields, rigid_parts, weak_spots
-from technic.system.assemble import ElementFactory, System, assemble, element_of, rigid_element_of
+from technic.system.assemble import System, assemble
 from technic.system.inverse import single_thread
-from technic.system.part_models import models_of, solid_element_of
+from technic.system.part_models import FACTORIES, PartModel, models_of, plain_parts
 from technic.tolerances import MAIN_COMPONENT_SHARE, MOBILITY_GAP
 
-__all__ = ["Measure", "PartModel", "analyze"]
+__all__ = ["FACTORIES", "Measure", "PartModel", "analyze"]
 
 Measure = Literal["mean_square", "nodal"]
-PartModel = Literal["solid", "frame", "rigid"]
-
-FACTORIES: dict[str, ElementFactory] = {
-    "solid": solid_element_of,
-    "frame": element_of,
-    "rigid": rigid_element_of,
-}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +60,7 @@ def analyze(
     *,
     measure: Measure = "mean_square",
     modes: int = 6,
-    parts: PartModel = "frame",
+    parts: PartModel = "solid",
     table: StiffnessTable | None = None,
 ) -> RigidityReport:
     """Tell how rigid an assembly is.
@@ -81,8 +74,8 @@ def analyze(
     modes : int
         Elastic modes of the heaviest component.
     parts : {"solid", "frame", "rigid"}
-        What parts are made of: condensed solid models where they are shipped (frame members
-        elsewhere), frame members, or rigid bodies.
+        What parts are made of: condensed solid models where they are shipped (elsewhere frame
+        members, or rigid bodies where a part has none), frame members, or rigid bodies.
     table : StiffnessTable, optional
         Where the joints' stiffnesses came from; when some of them were measured, the rigidity gets a
         95 % interval.
@@ -145,6 +138,7 @@ def analyze(
         ),
         unknowns=system.size,
         part_models=models_of(assembly, parts),
+        plain_parts=plain_parts(assembly, parts),
         mass=system.mass,
         qualifier=_qualifier(assembly),
         not_modelled=not_modelled(assembly),

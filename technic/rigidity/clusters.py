@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from technic.geometry import Array, shift_twist
@@ -61,19 +62,17 @@ class Cluster:
 
 def joint_slip(kin: Kinematics, motions: ComponentMotions, links: list[int]) -> Array:
     """Return how much each joint moves in the motions, (len(links), 6): the largest over the basis."""
-    place = {p: k for k, p in enumerate(motions.parts)}
-    if not links or motions.twists.shape[1] == 0:
-        return np.zeros((len(links), 6))
-    data, rows, columns = [], [], []
-    for row, k in enumerate(links):
-        for side, part in enumerate(kin.owners[k]):
-            data.append(kin.sides[k, side].ravel())
-            rows.append(np.repeat(np.arange(6 * row, 6 * row + 6), 6))
-            columns.append(np.tile(np.arange(6 * place[part], 6 * place[part] + 6), 6))
-    shape = (6 * len(links), 6 * len(motions.parts))
-    coordinates = (np.concatenate(rows), np.concatenate(columns))
-    slip = sparse.csr_array((np.concatenate(data), coordinates), shape=shape) @ motions.twists
-    return np.asarray(abs(slip).max(axis=1).toarray()).reshape(len(links), 6)
+    out = np.zeros((len(links), 6))
+    if motions.twists.shape[1] == 0:
+        return out
+    owners = [kin.owners[k] for k in links]
+    for count in (1, 2):
+        rows = np.flatnonzero([len(owner) == count for owner in owners])
+        if len(rows):
+            chosen = [links[row] for row in rows]
+            parts = np.array([owners[row] for row in rows])
+            out[rows] = _largest(kin, motions, parts, kin.sides[chosen, :count])
+    return out
 
 
 def find_clusters(kin: Kinematics, motions: ComponentMotions, links: list[int]) -> list[Cluster]:
@@ -90,19 +89,13 @@ def find_clusters(kin: Kinematics, motions: ComponentMotions, links: list[int]) 
     ]
     first = connected_groups(motions.parts, still)
     home = {p: n for n, parts in enumerate(first) for p in parts}
-    fasteners = {
-        n for n, parts in enumerate(first) if all(kin.assembly.parts[p].fastener for p in parts)
-    }
     outer: list[list[int]] = [[] for _ in first]
     for k in links:
         homes = {home[p] for p in kin.owners[k]}
         if len(homes) > 1 or len(kin.owners[k]) == 1:
             for n in homes:
                 outer[n].append(k)
-    rows = motions.twists.tocsr()
-    bonds: list[tuple[int, int]] = []
-    for n in sorted(fasteners):
-        bonds += _bonds(kin, motions.parts, rows, first[n], outer[n], home, n)
+    bonds = _bonds(kin, motions, first, outer, home)
     groups = connected_groups(range(len(first)), bonds)
     clusters = []
     for group in groups:
@@ -119,37 +112,73 @@ def find_clusters(kin: Kinematics, motions: ComponentMotions, links: list[int]) 
 
 def _bonds(
     kin: Kinematics,
-    everyone: tuple[int, ...],
-    rows: sparse.csr_array,
-    parts: tuple[int, ...],
-    outer: list[int],
+    motions: ComponentMotions,
+    groups: list[tuple[int, ...]],
+    outer: list[list[int]],
     home: dict[int, int],
-    own: int,
 ) -> list[tuple[int, int]]:
-    """Bond the neighbours of a fastener that move alike, and the fastener when all of them do."""
-    place = {p: k for k, p in enumerate(everyone)}
-    neighbors: dict[int, int] = {}
-    for k in outer:
-        if len(kin.owners[k]) == 1:
-            return []
-        for p in kin.owners[k]:
-            if p not in parts:
-                neighbors.setdefault(home[p], p)
-    point = kin.origins[parts[0]]
-    twists = {}
-    for n, p in neighbors.items():
-        arm = (point - kin.origins[p]) / kin.length
-        twists[n] = shift_twist(arm) @ rows[6 * place[p] : 6 * place[p] + 6].toarray()
-    order = sorted(neighbors)
-    alike = [
-        (a, b)
-        for i, a in enumerate(order)
-        for b in order[i + 1 :]
-        if np.abs(twists[a] - twists[b]).max(initial=0.0) < MOTION_KIND_CUT
+    """Bond the neighbours of fasteners that move alike, and the fastener when all of them do."""
+    around: dict[int, dict[int, int]] = {}
+    for n, parts in enumerate(groups):
+        if not all(kin.assembly.parts[p].fastener for p in parts):
+            continue
+        if any(len(kin.owners[k]) == 1 for k in outer[n]):
+            continue
+        neighbors: dict[int, int] = {}
+        for k in outer[n]:
+            for p in kin.owners[k]:
+                if home[p] != n:
+                    neighbors.setdefault(home[p], p)
+        around[n] = neighbors
+    pairs = [
+        (n, a, b)
+        for n, neighbors in around.items()
+        for i, a in enumerate(sorted(neighbors))
+        for b in sorted(neighbors)[i + 1 :]
     ]
-    if len(order) > 1 and len(connected_groups(order, alike)) == 1:
-        alike.append((own, order[0]))
-    return alike
+    if not pairs:
+        return []
+    points = kin.origins[[groups[n][0] for n, _, _ in pairs]]
+    parts_of = np.array([[around[n][a], around[n][b]] for n, a, b in pairs])
+    arms = (points[:, None] - kin.origins[parts_of]) / kin.length
+    blocks = shift_twist(arms) * np.array([1.0, -1.0])[:, None, None]
+    apart = _largest(kin, motions, parts_of, blocks).max(axis=1)
+    alike: dict[int, list[tuple[int, int]]] = {n: [] for n in around}
+    for (n, a, b), gap in zip(pairs, apart, strict=True):
+        if gap < MOTION_KIND_CUT:
+            alike[n].append((a, b))
+    bonds: list[tuple[int, int]] = []
+    for n, neighbors in around.items():
+        bonds += alike[n]
+        if len(neighbors) > 1 and len(connected_groups(list(neighbors), alike[n])) == 1:
+            bonds.append((n, min(neighbors)))
+    return bonds
+
+
+def _largest(
+    kin: Kinematics, motions: ComponentMotions, parts: NDArray[np.int64], blocks: Array
+) -> Array:
+    """Return the largest size over all motions of sums of twists, (m, 6).
+
+    Parameters
+    ----------
+    kin : Kinematics
+    motions : ComponentMotions
+    parts : (m, k) ndarray of int
+        Whose twists are added, in each sum.
+    blocks : (m, k, 6, 6) ndarray
+        What each twist is multiplied with.
+    """
+    place = np.zeros(len(kin.assembly.parts), dtype=np.int64)
+    place[list(motions.parts)] = np.arange(len(motions.parts))
+    rows = (6 * np.arange(len(parts))[:, None] + np.arange(6))[:, None, :, None]
+    columns = (6 * place[parts][..., None] + np.arange(6))[:, :, None, :]
+    coordinates = tuple(a.ravel() for a in np.broadcast_arrays(rows, columns))
+    shape = (6 * len(parts), 6 * len(motions.parts))
+    matrix = sparse.csr_array((blocks.ravel(), coordinates), shape=shape)
+    matrix.eliminate_zeros()
+    sums = abs(matrix @ motions.twists)
+    return np.asarray(sums.max(axis=1).toarray()).reshape(len(parts), 6)
 
 
 def _cluster(kin: Kinematics, parts: tuple[int, ...], outer: tuple[int, ...]) -> Cluster:

@@ -40,13 +40,18 @@ def _whole(values: Array, tolerance: float) -> NDArray[np.int64] | None:
     return nearest.astype(np.int64)
 
 
-def _direction(axis: Array) -> NDArray[np.int64] | None:
-    """Return whole numbers in the direction of a unit vector, or None when it is on no lattice."""
+def _directions(axes: Array) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return whole numbers in the direction of unit vectors, (n, 3), and which of them are on a lattice."""
+    out = np.zeros(axes.shape, dtype=np.int64)
+    found = np.zeros(len(axes), dtype=bool)
     for denominator in DENOMINATORS:
-        whole = _whole(axis * denominator, LATTICE_DIRECTION * denominator)
-        if whole is not None and int(whole @ whole) == denominator**2:
-            return whole
-    return None
+        scaled = axes * denominator
+        whole = np.rint(scaled).astype(np.int64)
+        near = np.abs(scaled - whole).max(axis=1) <= LATTICE_DIRECTION * denominator
+        fits = near & (np.sum(whole * whole, axis=1) == denominator**2) & ~found
+        out[fits] = whole[fits]
+        found |= fits
+    return out, found
 
 
 def lattice_rows(kin: Kinematics, links: list[int]) -> list[Rows] | None:
@@ -55,52 +60,49 @@ def lattice_rows(kin: Kinematics, links: list[int]) -> list[Rows] | None:
     Twists are taken about the world's origin, where a force along e through p does work with the moment
     ``p x e``; scaling a row changes no rank.
     """
-    assembly = kin.assembly
-    out: list[Rows] = []
-    for k in links:
-        owner = kin.owners[k]
-        if len(owner) == 2:
-            joint = assembly.joints[k]
-            point, axes = joint.point, joint.axes
+    joints, supports = kin.assembly.joints, kin.assembly.supports
+    points = np.zeros((len(links), 3))
+    axes = np.tile(np.eye(3), (len(links), 1, 1))
+    for row, k in enumerate(links):
+        if k < len(joints):
+            points[row], axes[row] = joints[k].point, joints[k].axes
         else:
-            support = assembly.supports[k - len(assembly.joints)]
-            point = kin.origins[support.part] if support.point is None else support.point
-            axes = np.eye(3)
-        place = _whole(point / LDU * POINT_SCALE, LATTICE_POINT * POINT_SCALE)
-        held = kin.held[k]
-        # only the axis itself has to be whole when both motions across it are held alike
-        frame = _frame(axes, held)
-        if place is None or frame is None:
-            return None
-        rows = []
-        for motion in np.flatnonzero(held):
-            e = frame[motion % 3]
-            row = np.zeros(6, dtype=np.int64)
-            if motion < 3:
-                row[:3] = e * POINT_SCALE
-                row[3:] = np.cross(place, e)
-            else:
-                row[3:] = e
-            rows.append(row)
-        block = np.array(rows, dtype=np.int64).reshape(-1, 6) % PRIME
-        both = [block, (-block) % PRIME][: len(owner)]
+            support = supports[k - len(joints)]
+            points[row] = kin.origins[support.part] if support.point is None else support.point
+    held = kin.held[links]
+    places = _whole(points / LDU * POINT_SCALE, LATTICE_POINT * POINT_SCALE)
+    frames = _frames(axes, held)
+    if places is None or frames is None:
+        return None
+    rows = np.zeros((len(links), 6, 6), dtype=np.int64)
+    rows[:, :3, :3] = frames * POINT_SCALE
+    rows[:, :3, 3:] = np.cross(places[:, None], frames)
+    rows[:, 3:, 3:] = frames
+    rows %= PRIME
+    out: list[Rows] = []
+    for k, block, own in zip(links, rows, held, strict=True):
+        owner = kin.owners[k]
+        both = [block[own], (-block[own]) % PRIME][: len(owner)]
         out.append((owner, np.hstack(both)))
     return out
 
 
-def _frame(axes: Array, held: NDArray[np.bool_]) -> NDArray[np.int64] | None:
-    """Return three whole vectors that span what the held motions of a joint span."""
-    axis = _direction(axes[0])
-    if axis is None:
+def _frames(axes: Array, held: NDArray[np.bool_]) -> NDArray[np.int64] | None:
+    """Return three whole vectors per joint, (n, 3, 3), that span what its held motions span."""
+    axis, found = _directions(axes[:, 0])
+    if not found.all():
         return None
-    if held[1] == held[2] and held[4] == held[5]:
-        # any two directions across the axis do: take them from the coordinate axes
-        across = np.cross(axis, np.eye(3, dtype=np.int64)[int(np.argmin(np.abs(axis)))])
-        return np.array([axis, across, np.cross(axis, across)])
-    others = [_direction(a) for a in axes[1:]]
-    if others[0] is None or others[1] is None:
-        return None
-    return np.array([axis, others[0], others[1]])
+    # Where both motions across the axis are held alike, any two directions across it do: take them from
+    # the coordinate axes.
+    alike = (held[:, 1] == held[:, 2]) & (held[:, 4] == held[:, 5])
+    across = np.cross(axis, np.eye(3, dtype=np.int64)[np.argmin(np.abs(axis), axis=1)])
+    out = np.stack([axis, across, np.cross(axis, across)], axis=1)
+    for side in (1, 2):
+        own, found = _directions(axes[~alike, side])
+        if not found.all():
+            return None
+        out[~alike, side] = own
+    return out
 
 
 def modular_rank(rows: list[Rows]) -> int:

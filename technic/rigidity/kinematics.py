@@ -84,14 +84,18 @@ class Kinematics:
         joints = self.assembly.joints
         return frozenset(k for k, joint in enumerate(joints) if joint.type is JointType.MESH)
 
+    @cached_property
+    def _links(self) -> tuple[tuple[int, ...], ...]:
+        """Joints and supports of every component."""
+        out: list[list[int]] = [[] for _ in self.components]
+        own = self.component_of.tolist()
+        for k, owner in enumerate(self.owners):
+            out[own[owner[0]]].append(k)
+        return tuple(tuple(links) for links in out)
+
     def links_of(self, component: int, *, meshes: bool = True) -> list[int]:
         """Return the joints and supports of a component, with or without the gears in mesh."""
-        own = self.component_of
-        return [
-            k
-            for k, owner in enumerate(self.owners)
-            if own[owner[0]] == component and (meshes or k not in self.meshes)
-        ]
+        return [k for k in self._links[component] if meshes or k not in self.meshes]
 
     @property
     def units(self) -> Array:
@@ -182,23 +186,20 @@ def component_motions(
     bodies = _merge_fixed(kin, parts, links)
     heads = sorted(set(bodies.values()))
     number = {h: k for k, h in enumerate(heads)}
-    carry = {
-        p: _carry(kin, bodies[p], p)[np.ix_(dofs, dofs)] for p in parts
-    }  # twist of the body's head -> twist of the part
-    blocks: list[Block] = []
-    for k in _needed(kin, links):
-        owner = kin.owners[k]
-        rows = kin.held[k]
-        if len(owner) == 2 and bodies[owner[0]] == bodies[owner[1]]:
-            continue
-        block = [kin.sides[k, s][np.ix_(rows, dofs)] @ carry[p] for s, p in enumerate(owner)]
-        blocks.append((tuple(number[bodies[p]] for p in owner), np.hstack(block)))
+    body = np.array([number[bodies[p]] for p in parts])
+    arms = (kin.origins[list(parts)] - kin.origins[np.array(heads)[body]]) / kin.length
+    # twist of the body's head -> twist of the part
+    carry = shift_twist(arms)[:, dofs[:, None], dofs]
+    blocks = _rows(kin, links, {p: k for k, p in enumerate(parts)}, body, carry)
     space: NullSpace = null_space(blocks, len(heads), width, cut)
-    expand = sparse.lil_array((6 * len(parts), width * len(heads)))
-    for k, p in enumerate(parts):
-        h = width * number[bodies[p]]
-        expand[6 * k + dofs, h : h + width] = carry[p]
-    twists = sparse.csc_array(expand.tocsr() @ space.basis)
+    rows = (6 * np.arange(len(parts))[:, None] + dofs)[:, :, None]
+    columns = (width * body[:, None] + np.arange(width))[:, None, :]
+    coordinates = tuple(a.ravel() for a in np.broadcast_arrays(rows, columns))
+    expand = sparse.csr_array(
+        (carry.ravel(), coordinates), shape=(6 * len(parts), width * len(heads))
+    )
+    expand.eliminate_zeros()
+    twists = sparse.csc_array(expand @ space.basis)
     lengths = np.sqrt(np.asarray(twists.multiply(twists).sum(axis=0)).ravel())
     return ComponentMotions(
         parts=parts,
@@ -209,28 +210,65 @@ def component_motions(
     )
 
 
+def _rows(
+    kin: Kinematics,
+    links: list[int],
+    place: dict[int, int],
+    body: NDArray[np.int64],
+    carry: Array,
+) -> list[Block]:
+    """Return the rows of a component's links on its bodies.
+
+    Parameters
+    ----------
+    kin : Kinematics
+    links : list of int
+    place : dict of int to int
+        Number of a part within the component.
+    body : (n,) ndarray of int
+        Body of each of its parts.
+    carry : (n, width, width) ndarray
+        Twist of the body's head -> twist of the part.
+    """
+    blocks: list[Block] = []
+    needed = _needed(kin, links)
+    for count in (2, 1):
+        chosen = [k for k in needed if len(kin.owners[k]) == count]
+        if not chosen:
+            continue
+        owners = np.array([[place[p] for p in kin.owners[k]] for k in chosen])
+        sides = kin.sides[chosen, :count][..., kin.dofs] @ carry[owners]
+        turned = np.concatenate(list(np.moveaxis(sides, 1, 0)), axis=2)
+        for own, block, held in zip(body[owners].tolist(), turned, kin.held[chosen], strict=True):
+            if len(set(own)) == count:
+                blocks.append((tuple(own), block[held]))
+    return blocks
+
+
 def _needed(kin: Kinematics, links: list[int]) -> list[int]:
     """Leave out joints that follow from others: of parts joined pairwise at one place in the same way, a
     chain is enough.
     """
     joints = kin.assembly.joints
     heads: dict[tuple[bytes, int], int] = {}
+    own = [k for k in links if k < len(joints)]
+    supports = [k for k in links if k >= len(joints)]
+    if not own:
+        return supports
     out = []
-    for k in links:
-        if k >= len(joints):
-            out.append(k)
-            continue
-        held = kin.held[k]
-        place = np.round(joints[k].point, 9) + 0.0
-        # a ball joint has no axes to agree on
-        ball = held[:3].all() and not held[3:].any()
-        axes = np.zeros(9) if ball else np.round(joints[k].axes.ravel(), 9) + 0.0
-        key = np.concatenate([place, axes, held]).tobytes()
+    held = kin.held[own]
+    axes = np.array([joints[k].axes.ravel() for k in own])
+    # a ball joint has no axes to agree on
+    axes[held[:, :3].all(axis=1) & ~held[:, 3:].any(axis=1)] = 0.0
+    points = np.array([joints[k].point for k in own])
+    keys = np.hstack([np.round(points, 9) + 0.0, np.round(axes, 9) + 0.0, held])
+    for k, row in zip(own, keys, strict=True):
+        key = row.tobytes()
         a, b = (_head(heads, key, p) for p in kin.owners[k])
         if a != b:
             heads[key, a] = b
             out.append(k)
-    return out
+    return out + supports
 
 
 def _head(heads: dict[tuple[bytes, int], int], key: bytes, part: int) -> int:
@@ -254,8 +292,3 @@ def _merge_fixed(kin: Kinematics, parts: tuple[int, ...], links: list[int]) -> d
         head = members[int(np.argmin(near))]
         heads.update(dict.fromkeys(members, head))
     return heads
-
-
-def _carry(kin: Kinematics, head: int, part: int) -> Array:
-    arm = (kin.origins[part] - kin.origins[head]) / kin.length
-    return shift_twist(arm)

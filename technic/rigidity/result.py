@@ -11,6 +11,7 @@ from typing import Any
 
 from technic.assembly.model import Assembly
 from technic.geometry import Array, readonly
+from technic.system.part_models import PlainPart
 
 __all__ = [
     "Component",
@@ -234,6 +235,8 @@ class RigidityReport:
         Of the whole model (kg).
     part_models : mapping of str to int
         How many parts are solid models, frame members, rigid bodies.
+    plain_parts : tuple of PlainPart
+        The kinds of part without a solid model, when solid models were asked for.
     qualifier : str
         "", "at least" or "at most": how the count of motions is to be read.
     not_modelled : tuple of str
@@ -256,6 +259,7 @@ class RigidityReport:
     unknowns: int
     mass: float
     part_models: Mapping[str, int] = field(default_factory=dict)
+    plain_parts: tuple[PlainPart, ...] = ()
     qualifier: str = ""
     not_modelled: tuple[str, ...] = ()
     timings: Mapping[str, float] = field(default_factory=dict)

@@ -274,6 +274,7 @@ def _model(report: RigidityReport) -> dict[str, Any]:
         "components": len(report.components),
         "dof": report.unknowns,
         "part_models": dict(report.part_models),
+        "plain_parts": [plain.to_dict() for plain in report.plain_parts],
         "mass_kg": report.mass,
         "size_mm": size_mm(assembly),
         "unknown_parts": [
