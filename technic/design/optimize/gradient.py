@@ -101,23 +101,21 @@ def _add_members(
     lengths = np.linalg.norm(spans, axis=1)
     section, material = group.section, group.material
     triples = full[group.dofs].reshape(len(spans), 4, 3, -1)
-    local = np.einsum("mab,mcbk->mcak", turn_of(spans, group.normals), triples)
+    local = turn_of(spans, group.normals)[:, None] @ triples
     flat = local.reshape(len(spans), 12, -1)
     step = lengths * (1.0 + STEP * 1j)
     k, m = local_stiffness(step, section, material), local_mass(step, section, material) / mass
     size = (STEP * lengths)[:, None]
     # kg per metre of length, and what the mass of the whole does to the mean square
     line = values[None, :] * material.density * section.area / mass
-    along = np.einsum("mak,mab,mbk->mk", flat, k.imag, flat) / size
-    along -= values * np.einsum("mak,mab,mbk->mk", flat, m.imag, flat) / size
-    along += line
+    along = np.sum(flat * (k.imag @ flat - values * (m.imag @ flat)), axis=1) / size + line
     force = (k.real @ flat - values * (m.real @ flat)).reshape(local.shape)
     slope = along.T[:, :, None] * (spans / lengths[:, None])
     for c in range(3):
         probe = spans.astype(complex)
         probe[:, c] += 1j * STEP
         change = turn_of(probe, group.normals).imag / STEP
-        slope[:, :, c] += 2.0 * np.einsum("mcak,mab,mcbk->km", force, change, triples)
+        slope[:, :, c] += 2.0 * np.sum(force * (change[:, None] @ triples), axis=(1, 2)).T
     _spread(slopes.nodes, group.first, group.last, slope)
 
 

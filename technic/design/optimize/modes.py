@@ -31,6 +31,9 @@ POWERS: Final = 5
 NEW: Final = 3
 """Random vectors beside the modes of the geometry before."""
 
+ROUNDS: Final = 4
+"""Restarts of the block from what it found, before the solver of the analysis takes over."""
+
 SOUND: Final = 1e-7
 """Largest relative residual of the modes that matter; eigenvalues are as exact as its square."""
 
@@ -103,31 +106,35 @@ class Tracker:
             return np.asarray(answer - free @ (weighted.T @ answer))
 
         random = np.random.default_rng(n).standard_normal((n, NEW))
-        block = inverse(measure @ np.hstack([start, random]))
-        blocks = [block]
-        for _ in range(POWERS - 1):
-            scale = np.sqrt(np.einsum("nk,nk->k", block, measure @ block))
-            block = inverse(measure @ (block / scale))
-            blocks.append(block)
-        basis = np.hstack(blocks)
-        basis /= np.linalg.norm(basis, axis=0)
-        basis, triangle, _ = linalg.qr(basis, mode="economic", pivoting=True)
-        basis = basis[:, np.abs(np.diag(triangle)) > 1e-11 * abs(triangle[0, 0])]
-        small = basis.T @ (stiffness @ basis)
-        weight = basis.T @ (measure @ basis)
-        try:
-            values, inner = linalg.eigh(
-                (small + small.T) / 2.0,
-                (weight + weight.T) / 2.0,
-                subset_by_index=[0, self.count - 1],
-            )
-        except linalg.LinAlgError:
-            return None
-        vectors = basis @ inner
-        checked = min(3, self.count)
-        rest = inverse(measure @ vectors[:, :checked]) * (values[:checked] + shift)
-        rest -= vectors[:, :checked]
-        size = np.sqrt(np.einsum("nk,nk->k", rest, measure @ rest))
-        if values[0] <= 0.0 or size.max() > SOUND:
-            return None
-        return values, vectors
+        for _ in range(ROUNDS):
+            block = inverse(measure @ np.hstack([start, random]))
+            blocks = [block]
+            for _ in range(POWERS - 1):
+                scale = np.sqrt(np.einsum("nk,nk->k", block, measure @ block))
+                block = inverse(measure @ (block / scale))
+                blocks.append(block)
+            basis = np.hstack(blocks)
+            basis /= np.linalg.norm(basis, axis=0)
+            basis, triangle, _ = linalg.qr(basis, mode="economic", pivoting=True)
+            basis = basis[:, np.abs(np.diag(triangle)) > 1e-11 * abs(triangle[0, 0])]
+            small = basis.T @ (stiffness @ basis)
+            weight = basis.T @ (measure @ basis)
+            try:
+                values, inner = linalg.eigh(
+                    (small + small.T) / 2.0,
+                    (weight + weight.T) / 2.0,
+                    subset_by_index=[0, min(self.count + NEW, basis.shape[1]) - 1],
+                )
+            except linalg.LinAlgError:
+                return None
+            vectors = basis @ inner
+            checked = min(3, self.count)
+            rest = inverse(measure @ vectors[:, :checked]) * (values[:checked] + shift)
+            rest -= vectors[:, :checked]
+            size = np.sqrt(np.einsum("nk,nk->k", rest, measure @ rest))
+            if values[0] <= 0.0:
+                return None
+            if size.max() <= SOUND:
+                return values[: self.count], vectors[:, : self.count]
+            start, random = vectors[:, : self.count], vectors[:, self.count :]
+        return None

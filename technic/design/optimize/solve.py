@@ -2,7 +2,7 @@
 
 Sequential quadratic programming (SLSQP; D. Kraft, DFVLR-FB 88-28, 1988) inside a box of limited moves
 around the best geometry so far. The box grows while it pays and shrinks when it does not; the smooth
-minimum over the lowest modes is sharpened on the way.
+minimum over the lowest modes is sharpened on the way. Long runs at the end find the optimum itself.
 """
 
 from __future__ import annotations
@@ -38,6 +38,18 @@ SMALL: Final = 5e-4
 
 GAIN: Final = 5e-3
 """...or a round gains less than this share of the objective, at every sharpness."""
+
+POLISH: Final = (250.0, 1000.0)
+"""Sharpness of the last searches, which run long enough for SLSQP to learn the curvature."""
+
+CLOSE: Final = 0.1
+"""Limit of a move in these, in mean bar lengths..."""
+
+ROUNDS: Final = 6
+"""...their number at most..."""
+
+FINE: Final = 1e-4
+"""...and the gain (share of the objective) below which they end."""
 
 BROKEN: Final = 1e-6
 """Limits count as kept within this share of the mean bar length: what SLSQP keeps them to."""
@@ -223,6 +235,14 @@ class _Search:
                     poor, reach = poor + 1, 0.3 * reach
                 if poor > 0:
                     break
+        for sharpness in POLISH:
+            self.objective.sharpness = sharpness
+            for _ in range(ROUNDS):
+                best = self.best
+                end = self.round(self.best_q, CLOSE * unit, 60)
+                self.point(end)
+                if best - self.best < FINE * max(1.0, abs(best)):
+                    break
 
 
 def optimize(
@@ -236,7 +256,7 @@ def optimize(
     clearance: float | None = None,
     max_mass: float | None = None,
     restarts: int = 0,
-    max_evaluations: int = 150,
+    max_evaluations: int = 500,
     max_seconds: float = np.inf,
     seed: int = 0,
     progress: Callable[[Step], None] | None = None,
