@@ -42,7 +42,7 @@ def build(
     import tempfile
 
     from technic.errors import UsageError
-    from technic.fem.solid.grid import MeshSettings
+    from technic.fem.solid.settings import MeshSettings
     from technic.fem.solid.store import build as build_all
     from technic.fem.solid.store import has_solid_model, read, shape_key, write
     from technic.parts.catalogue import catalogue

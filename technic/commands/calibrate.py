@@ -55,7 +55,7 @@ def calibrate(
     no_offsets: Annotated[
         bool, typer.Option("--no-offsets", help="Do not look for free play and hysteresis.")
     ] = False,
-    parts: PartModelOption = "frame",
+    parts: PartModelOption = "solid",
     quiet: QuietOption = False,
 ) -> None:
     """Find the stiffness of joints from readings of weights hung on a rig."""
@@ -115,8 +115,8 @@ def _solve(
     parts: str,
 ) -> Calibration:
     from technic.assembly.stiffness import read_table
-    from technic.rigidity.analyze import FACTORIES
     from technic.statics.calibration import calibrate as solve
+    from technic.system.part_models import FACTORIES
 
     return solve(
         readings,

@@ -89,7 +89,7 @@ def deflect(
     ] = None,
     json: JsonOption = None,
     how: ModelOptions = AS_FOUND,
-    parts: PartModelOption = "frame",
+    parts: PartModelOption = "solid",
     quiet: QuietOption = False,
 ) -> None:
     """Say how far a model moves under loads, and what its joints carry."""
@@ -99,10 +99,9 @@ def deflect(
     from technic.report.files import check_writable
     from technic.report.json import STDOUT, write_json
     from technic.report.style import style_for
-    from technic.rigidity.analyze import FACTORIES
     from technic.statics.loads import GRAVITY, parse_hang, parse_load, parse_probe
     from technic.statics.solve import deflect as solve
-    from technic.system.part_models import models_of
+    from technic.system.part_models import FACTORIES, models_of, plain_parts
 
     if not (load or hang or gravity):
         raise UsageError("nothing acts on the model; give --load, --hang or --gravity")
@@ -129,7 +128,15 @@ def deflect(
             displacement_interval(answer, points, k, options["table"], FACTORIES[parts])
             for k in range(len(points))
         )
-    case = StaticCase(answer, tuple(loads), probes, weight, intervals, models_of(assembly, parts))
+    case = StaticCase(
+        answer,
+        tuple(loads),
+        probes,
+        weight,
+        intervals,
+        models_of(assembly, parts),
+        plain_parts(assembly, parts),
+    )
     if json is not None:
         write_json(deflection_dict(case), json)
     if not quiet and json != STDOUT:

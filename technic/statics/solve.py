@@ -12,7 +12,7 @@ from technic.assembly.model import Assembly
 from technic.errors import NumericalError, UsageError
 from technic.geometry import Array, readonly
 from technic.rigidity.kinematics import component_motions, kinematics
-from technic.system.assemble import ElementFactory, Probe, System, assemble, element_of
+from technic.system.assemble import ElementFactory, Probe, System, assemble, solid_element_of
 from technic.system.inverse import SHIFT, shifted_inverse, single_thread
 from technic.tolerances import DRIVEN_MOTION, STATIC_RESIDUAL
 
@@ -85,7 +85,7 @@ def deflect(
     *,
     gravity: Array | None = None,
     probes: tuple[Probe, ...] = (),
-    element: ElementFactory = element_of,
+    element: ElementFactory = solid_element_of,
 ) -> Deflection:
     """Return the static displacement of an assembly.
 

@@ -11,7 +11,7 @@ import numpy as np
 from technic.assembly.stiffness import StiffnessTable
 from technic.rigidity.uncertainty import NORMAL_95
 from technic.statics.solve import Deflection, Load, deflect
-from technic.system.assemble import ElementFactory, Probe, element_of
+from technic.system.assemble import ElementFactory, Probe, solid_element_of
 from technic.system.parameters import Parameter, parameter_rows
 
 __all__ = ["displacement_interval"]
@@ -22,7 +22,7 @@ def displacement_interval(
     points: tuple[Load | Probe, ...],
     k: int,
     table: StiffnessTable,
-    element: ElementFactory = element_of,
+    element: ElementFactory = solid_element_of,
 ) -> tuple[float, float] | None:
     """Return the 95 % interval of how far a point goes (m), along the way it goes.
 

@@ -6,7 +6,6 @@ diagonal with one block per part, so equal parts share one element.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,18 +13,28 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from technic.assembly.model import Assembly, Part
-from technic.fem.build import build_element
+from technic.assembly.model import Assembly
 from technic.fem.element import Element
 from technic.geometry import Array, shift_twist, turn_twist
-from technic.parts.definition import Body, MassProperties, RigidBody
+from technic.parts.definition import Body, MassProperties
+from technic.system.part_models import (
+    ElementFactory,
+    element_of,
+    rigid_element_of,
+    solid_element_of,
+)
 from technic.system.plane import check_plane, in_plane
 from technic.system.rows import HeldRows, held_rows, transfer
 
-__all__ = ["ElementFactory", "Probe", "System", "assemble", "element_of", "rigid_element_of"]
-
-ElementFactory = Callable[[Part, Array, tuple[str | None, ...]], Element]
-"""From a part, its attachment points (part coordinates) and their port names, to its element."""
+__all__ = [
+    "ElementFactory",
+    "Probe",
+    "System",
+    "assemble",
+    "element_of",
+    "rigid_element_of",
+    "solid_element_of",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,16 +119,6 @@ class System:
         return slice(int(self.offsets[part]), int(self.offsets[part + 1]))
 
 
-def element_of(part: Part, points: Array, _ports: tuple[str | None, ...]) -> Element:
-    """Return the element of a part's own body (frame members, a mesh, a rigid body...)."""
-    return build_element(part.body, part.mass_properties, points)
-
-
-def rigid_element_of(part: Part, points: Array, _ports: tuple[str | None, ...]) -> Element:
-    """Return the element of a part that is taken as rigid, whatever its body."""
-    return build_element(RigidBody(), part.mass_properties, points)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Probe:
     """A point of a part where a load acts or a displacement is asked for.
@@ -139,7 +138,10 @@ class Probe:
 
 
 def assemble(
-    assembly: Assembly, *, element: ElementFactory = element_of, probes: tuple[Probe, ...] = ()
+    assembly: Assembly,
+    *,
+    element: ElementFactory = solid_element_of,
+    probes: tuple[Probe, ...] = (),
 ) -> System:
     """Return the matrices of an assembly.
 
@@ -147,7 +149,8 @@ def assemble(
     ----------
     assembly : Assembly
     element : callable
-        What a part becomes: `element_of`, `rigid_element_of`, or one that looks up solid models.
+        What a part becomes: a condensed solid model where one is shipped (`solid_element_of`), its
+        own body (`element_of`: frame members, a mesh), or a rigid body (`rigid_element_of`).
     probes : tuple of Probe
         Points whose twist is wanted beside the joints'.
 

@@ -15,7 +15,6 @@ import io
 import json
 import zipfile
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, replace
 from importlib.resources import files
 from pathlib import Path
@@ -24,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from technic.errors import InputError, TechnicError
-from technic.fem.solid.grid import MeshSettings
+from technic.fem.solid.settings import MeshSettings
 from technic.fem.solid.superelement import SuperElement
 from technic.parts.definition import Material, PartDefinition, Port, PortKind
 from technic.parts.materials import ABS, material
@@ -187,6 +186,8 @@ def build(
     failures : dict
         Reason by part id.
     """
+    from concurrent.futures import ProcessPoolExecutor, as_completed
+
     chosen = settings or MeshSettings()
     work = list(definitions)
     elements: dict[str, SuperElement] = {}
