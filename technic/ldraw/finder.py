@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from technic.errors import InputError, UsageError
 from technic.geometry import Pose
@@ -18,6 +19,9 @@ from technic.ldraw.sections import Document
 from technic.ldraw.shadow import ShadowLibrary
 from technic.parts.catalogue import catalogue
 from technic.parts.definition import PartDefinition
+
+if TYPE_CHECKING:
+    from technic.ldraw.imported import Solids
 
 __all__ = ["EmbeddedStore", "LibrarySource", "PartFinder", "ShadowSource"]
 
@@ -79,6 +83,8 @@ class PartFinder:
         Connectors of the library's parts.
     document : Document, optional
         The model, for the parts that it draws itself.
+    solids : {"draft", "fine", "off"}
+        How finely parts of the library are meshed when an analysis wants solid models.
 
     Raises
     ------
@@ -91,6 +97,8 @@ class PartFinder:
         library: LibrarySource = None,
         shadow: ShadowSource = None,
         document: Document | None = None,
+        *,
+        solids: Solids = "draft",
     ) -> None:
         if library is None and shadow is not None:
             raise UsageError("the shadow library adds to an LDraw library: give that too")
@@ -101,6 +109,7 @@ class PartFinder:
         self._embedded: EmbeddedStore | None = None
         self._found: dict[str, tuple[PartDefinition, Pose] | None] = {}
         self._refused: dict[str, str] = {}
+        self._solids = solids
         self._shadow_source = shadow
         self._shadow: ShadowLibrary | None = None
         self.catalogue = catalogue()
@@ -155,7 +164,9 @@ class PartFinder:
         from technic.ldraw.imported import definition_from_library
 
         try:
-            made = definition_from_library(library, number, shadow=self._shadow)
+            made = definition_from_library(
+                library, number, shadow=self._shadow, solids=self._solids
+            )
         except InputError as error:
             self._refused[number] = f"its file in the parts library is unusable: {error.message}"
             return None

@@ -1,6 +1,7 @@
 """Definitions of parts that the catalogue does not have, made from an LDraw library.
 
-A definition so made is a rigid body with ports; its mass comes from its surface, where that is closed
+A definition so made has ports and a drawing, from which an analysis can make a solid model; by itself
+it is a rigid body. Its mass comes from its surface, where that is closed
 well enough, else from its box. What was estimated is said in `PartDefinition.source`.
 """
 
@@ -8,22 +9,37 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import Final
+from functools import partial
+from typing import Final, Literal
 
 import numpy as np
 
 from technic.errors import InputError
+from technic.geometry import Array
 from technic.ldraw.library import LIBRARY_FAMILY, Library
 from technic.ldraw.primitives import ports_from_primitives
 from technic.ldraw.shadow import ShadowLibrary
 from technic.ldraw.shadow_ports import ports_from_shadow
 from technic.ldraw.triangles import Surface, surface_of
 from technic.ldraw.undersides import stud_places
-from technic.parts.definition import MassProperties, PartDefinition, Port, PortKind, RigidBody
+from technic.parts.definition import (
+    Drawing,
+    MassProperties,
+    PartDefinition,
+    Port,
+    PortKind,
+    RigidBody,
+)
 from technic.parts.materials import material
-from technic.units import PITCH
+from technic.units import MM, PITCH
 
-__all__ = ["definition_from_library", "is_fastener", "mass_of"]
+__all__ = ["CELLS", "Solids", "definition_from_library", "is_fastener", "mass_of"]
+
+Solids = Literal["draft", "fine", "off"]
+
+CELLS: Final[dict[str, float]] = {"draft": 1.6 * MM, "fine": 0.8 * MM}
+"""Edge of the cells that a part of the library is meshed with, by setting (m); fine is the setting of
+the models that are shipped."""
 
 CLOSED: Final = 0.03
 """Largest gap of a surface (see `SurfaceIntegrals`) whose enclosed volume is trusted: of 244 Technic
@@ -38,7 +54,11 @@ BUSH_SIZE: Final = 1.2 * PITCH
 
 
 def definition_from_library(
-    library: Library, number: str, shadow: ShadowLibrary | None = None
+    library: Library,
+    number: str,
+    shadow: ShadowLibrary | None = None,
+    *,
+    solids: Solids = "draft",
 ) -> PartDefinition | None:
     """Return a definition of a part from its library files.
 
@@ -50,6 +70,8 @@ def definition_from_library(
         coordinates of the number asked for.
     shadow : ShadowLibrary, optional
         Its ports win over those from primitives, where it describes the part.
+    solids : {"draft", "fine", "off"}
+        How finely the part is meshed when an analysis wants its solid model; off: never.
 
     Returns
     -------
@@ -88,7 +110,16 @@ def definition_from_library(
         mass_properties=mass,
         fastener=is_fastener(ports, title, surface),
         source=f"LDraw library {resolved.key}; {origin}; {measured}",
+        drawing=None
+        if solids == "off"
+        else Drawing(partial(_triangles, library, number, fine=solids == "fine"), CELLS[solids]),
     )
+
+
+def _triangles(library: Library, number: str, *, fine: bool) -> Array:
+    surface = surface_of(library, number, fine=fine)
+    assert surface is not None  # the definition was made from it
+    return surface.triangles
 
 
 def _title(text: str) -> str:

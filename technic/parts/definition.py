@@ -5,7 +5,7 @@ All lengths are in metres and part coordinates (LDraw's axes: -y is up), masses 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -17,6 +17,7 @@ from technic.geometry import Array, readonly
 
 __all__ = [
     "Body",
+    "Drawing",
     "FrameBody",
     "MassProperties",
     "Material",
@@ -273,6 +274,23 @@ def outline(body: Body) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Drawing:
+    """The surface of a part as its library files draw it, from which a solid model can be made.
+
+    Parameters
+    ----------
+    triangles : callable
+        Returns the corners, (n, 3, 3), part coordinates (m), counter-clockwise seen from outside. They
+        are read when they are asked for. The surface need not be closed.
+    cell : float
+        Edge of the cells that the solid model is to be made of (m).
+    """
+
+    triangles: Callable[[], Array]
+    cell: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class PartDefinition:
     """A kind of part.
 
@@ -297,6 +315,8 @@ class PartDefinition:
         Description of the solid shape, as in the catalogue file; `technic.parts.shapes` builds it.
     source : str
         Where the facts come from.
+    drawing : Drawing or None
+        Of parts that are read from a parts library.
     """
 
     id: str
@@ -309,6 +329,7 @@ class PartDefinition:
     aliases: tuple[str, ...] = ()
     shape: Mapping[str, Any] = field(default_factory=dict)
     source: str = ""
+    drawing: Drawing | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ports", tuple(self.ports))

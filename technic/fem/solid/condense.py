@@ -47,6 +47,7 @@ __all__ = [
     "condense",
     "condense_and_lift",
     "element_stiffness",
+    "factorized",
     "free_modes",
     "mass_and_centroid",
     "mass_matrix",
@@ -179,7 +180,11 @@ def solid_of(triangles: Array, material: Material, settings: MeshSettings) -> So
     InputError
         See `technic.fem.solid.grid.mesh_part`.
     """
-    mesh = mesh_part(triangles, settings)
+    return factorized(mesh_part(triangles, settings), material)
+
+
+def factorized(mesh: Mesh, material: Material) -> Solid:
+    """Factorise the stiffness of a mesh."""
     factor = factorize(
         mesh.cells,
         mesh.nodes,
