@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from technic.assembly.model import (
     Assembly,
@@ -32,6 +32,9 @@ from technic.ldraw.gears import find_meshes, mesh_findings, mesh_joints
 from technic.ldraw.inner import InnerMotion, divide
 from technic.ldraw.library import LIBRARY_FAMILY
 from technic.parts.definition import PartDefinition
+
+if TYPE_CHECKING:
+    from technic.ldraw.imported import Solids
 
 __all__ = ["Reading", "load_ldraw", "lookup", "read_parts"]
 
@@ -76,6 +79,7 @@ def load_ldraw(
     gears: Gears = "off",
     inner: InnerMotion = "held",
     overrides: str | Path | None = None,
+    solids: Solids = "draft",
 ) -> Assembly:
     """Read an LDraw model and find its connections.
 
@@ -98,6 +102,9 @@ def load_ldraw(
         Whether motors and actuators hold their position or move freely.
     overrides : path-like, optional
         File of corrections to what is found; see `assembly.overrides`.
+    solids : {"draft", "fine", "off"}
+        How finely parts of the library are meshed when an analysis wants solid models of parts; off:
+        they are rigid bodies.
 
     Returns
     -------
@@ -109,7 +116,9 @@ def load_ldraw(
         The file cannot be understood, or has no part that is known.
     """
     document = read(path)
-    find = PartFinder(library, shadow, document)
+    if solids not in ("draft", "fine", "off"):
+        raise UsageError(f"solids is 'draft', 'fine' or 'off', not {solids!r}")
+    find = PartFinder(library, shadow, document, solids=solids)
     if gears not in ("off", "on"):
         raise UsageError(f"gears is 'off' or 'on', not {gears!r}")
     if inner not in ("held", "free"):
