@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from technic.assembly.joint_types import JointType
+from technic.assembly.stiffness import StiffnessTable
 from technic.geometry import Array, Pose, readonly
 from technic.parts.definition import Body, MassProperties, PartDefinition, Port
 
@@ -19,6 +20,7 @@ __all__ = [
     "FindingKind",
     "ImportSummary",
     "ImportedPart",
+    "Joining",
     "Joint",
     "Part",
     "Source",
@@ -261,6 +263,30 @@ class ImportSummary:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Joining:
+    """How the parts of a model file were joined: what it takes to join them in the same way again.
+
+    Parameters
+    ----------
+    table : StiffnessTable
+    axle_slide : {"held", "free"}
+        Whether friction keeps a part where it is on an axle that it grips.
+    gears : {"off", "on"}
+        Whether gears in mesh turn each other.
+    corrections : mapping or None
+        A user's corrections; see `assembly.overrides`.
+    corrected_by : str
+        The file they stand in.
+    """
+
+    table: StiffnessTable
+    axle_slide: Literal["held", "free"] = "held"
+    gears: Literal["off", "on"] = "off"
+    corrections: Mapping[str, Any] | None = None
+    corrected_by: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Assembly:
     """Parts, joints and supports, with what was found while reading them.
 
@@ -278,6 +304,8 @@ class Assembly:
         ``path``, ``sha256``, ``format`` ("ldraw" or "assembly"); empty when built in Python.
     imported : ImportSummary or None
         None for what is no LDraw model.
+    joining : Joining or None
+        None where the joints were not found from the parts.
     """
 
     name: str
@@ -289,6 +317,7 @@ class Assembly:
     findings: tuple[Finding, ...] = ()
     source: dict[str, Any] = field(default_factory=dict)
     imported: ImportSummary | None = None
+    joining: Joining | None = None
 
     def index(self, part_id: str) -> int:
         """Return the index of the part with this id; KeyError if there is none."""

@@ -29,7 +29,7 @@ end of an id, or by a part number that the model has once. ::
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import pairwise
 from math import isfinite
@@ -46,9 +46,13 @@ from technic.errors import InputError, SchemaError, UsageError
 from technic.geometry import Array, axes_from, readonly
 from technic.units import LDU
 
-__all__ = ["SCHEMA", "apply_overrides", "read_overrides"]
+__all__ = ["SCHEMA", "apply_overrides", "by_user", "read_overrides"]
 
 SCHEMA: Final = "technic-overrides/1"
+
+WELD: Final = "weld"
+ADDED: Final = "@override"
+"""What tells a joint of the user: its connection, or a piece of its id."""
 
 ARM: Final = 0.004
 """Lever arm (m) of rotational stiffnesses that the file leaves out: a bore's radius and a half."""
@@ -93,8 +97,18 @@ class _Fault(Exception):
         self.key, self.message = key, message
 
 
+def by_user(joint: Joint) -> bool:
+    """Tell whether a joint was added by a user's correction."""
+    return joint.connection == WELD or ADDED in joint.id
+
+
 def apply_overrides(
-    assembly: Assembly, content: Mapping[str, Any], path: str | Path = ""
+    assembly: Assembly,
+    content: Mapping[str, Any],
+    path: str | Path = "",
+    *,
+    join: Callable[[Assembly], Assembly] | None = None,
+    lenient: bool = False,
 ) -> Assembly:
     """Return the assembly with a user's corrections; each becomes a finding of the report.
 
@@ -105,6 +119,15 @@ def apply_overrides(
         As from `read_overrides`.
     path : path-like
         The file, for messages.
+    join : callable, optional
+        Finds the joints, once the parts to ignore are gone. Left out: they have been found.
+    lenient : bool
+        Pass over what does not apply, instead of raising.
+
+    Returns
+    -------
+    Assembly
+        Its `joining`, if it has one, has the corrections with all parts named by their ids.
 
     Raises
     ------
@@ -129,9 +152,12 @@ def apply_overrides(
             faults += [f"{where}.{key}: unknown" for key in sorted(set(row) - keys)]
             try:
                 getattr(change, table)(row)
+                change.done[table].append(change.named(row))
             except _Fault as fault:
                 faults.append(f"{where}.{fault.key}: {fault.message}")
-    if faults:
+        if table == "ignore":
+            change.leave_out(join)
+    if faults and not lenient:
         raise SchemaError(faults, path=path or None)
     return change.result()
 
@@ -144,6 +170,44 @@ class _Change:
         self.joints = list(assembly.joints)
         self.ignored: set[int] = set()
         self.findings: list[Finding] = []
+        self.done: dict[str, list[dict[str, Any]]] = {table: [] for table in _KEYS}
+
+    def named(self, row: Mapping[str, Any]) -> dict[str, Any]:
+        """Return an entry with its parts named by their ids, which stay when other parts come."""
+        named = dict(row)
+        ids = [part.id for part in self.assembly.parts]
+        if "parts" in row:
+            named["parts"] = [ids[find_part(self.assembly, name)] for name in row["parts"]]
+        if "part" in row:
+            named["part"] = ids[find_part(self.assembly, row["part"])]
+        return named
+
+    def leave_out(self, join: Callable[[Assembly], Assembly] | None) -> None:
+        """Take the parts to ignore away and find the joints of the others."""
+        old = self.assembly
+        keep = [k for k in range(len(old.parts)) if k not in self.ignored]
+        place = {k: n for n, k in enumerate(keep)}
+        self.findings = [
+            Finding(FindingKind.OVERRIDE, f"{_FILE}: {old.parts[k].id} is left out")
+            for k in sorted(self.ignored)
+        ]
+        bare = replace(
+            old,
+            parts=tuple(old.parts[k] for k in keep),
+            joints=tuple(
+                replace(j, parts=(place[j.parts[0]], place[j.parts[1]]))
+                for j in old.joints
+                if not self.ignored & set(j.parts)
+            ),
+            supports=tuple(replace(s, part=place[s.part]) for s in old.supports if s.part in place),
+            findings=tuple(
+                replace(f, parts=tuple(place[p] for p in f.parts))
+                for f in old.findings
+                if not self.ignored & set(f.parts)
+            ),
+        )
+        self.assembly = bare if join is None else join(bare)
+        self.joints = list(self.assembly.joints)
 
     # --- entries ------------------------------------------------------------------------------
     def ignore(self, row: Mapping[str, Any]) -> None:
@@ -167,8 +231,8 @@ class _Change:
         pair = self._parts(row, exactly=2)
         point = self._vector(row.get("point"), "point") * LDU
         names = "~".join(self.assembly.parts[p].id for p in pair)
-        number = 1 + sum(j.id.startswith(f"{names}@override") for j in self.joints)
-        made = self._joint(row, (pair[0], pair[1]), f"{names}@override{number}", point, None)
+        number = 1 + sum(j.id.startswith(f"{names}{ADDED}") for j in self.joints)
+        made = self._joint(row, (pair[0], pair[1]), f"{names}{ADDED}{number}", point, None)
         self.joints.append(made)
         self._note(f"a {made.type.value} joint was added", pair)
 
@@ -186,35 +250,21 @@ class _Change:
                     axes=axes_from((1.0, 0.0, 0.0)),
                     held=np.ones(6, dtype=bool),
                     stiffness=np.full(6, np.inf),
-                    connection="weld",
+                    connection=WELD,
                     provenance=_FILE,
                 )
             )
         self._note(f"{len(parts)} parts are one piece", parts)
 
     def result(self) -> Assembly:
-        """Return the corrected assembly, without the parts that are ignored."""
-        old = self.assembly
-        keep = [k for k in range(len(old.parts)) if k not in self.ignored]
-        place = {k: n for n, k in enumerate(keep)}
-        for k in sorted(self.ignored):
-            self.findings.append(
-                Finding(FindingKind.OVERRIDE, f"{_FILE}: {old.parts[k].id} is left out")
-            )
+        """Return the corrected assembly."""
+        done = {"schema": SCHEMA} | {table: rows for table, rows in self.done.items() if rows}
+        joining = self.assembly.joining
         return replace(
-            old,
-            parts=tuple(old.parts[k] for k in keep),
-            joints=tuple(
-                replace(j, parts=(place[j.parts[0]], place[j.parts[1]]))
-                for j in self.joints
-                if not self.ignored & set(j.parts)
-            ),
-            supports=tuple(replace(s, part=place[s.part]) for s in old.supports if s.part in place),
-            findings=tuple(
-                replace(f, parts=tuple(place[p] for p in f.parts))
-                for f in (*old.findings, *self.findings)
-                if not self.ignored & set(f.parts)
-            ),
+            self.assembly,
+            joints=tuple(self.joints),
+            findings=(*self.assembly.findings, *self.findings),
+            joining=None if joining is None else replace(joining, corrections=done),
         )
 
     # --- pieces of entries ----------------------------------------------------------------------

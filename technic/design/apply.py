@@ -13,28 +13,33 @@ from typing import Final
 
 import numpy as np
 
-from technic.assembly.model import Assembly, Joint, Part, Source
+from technic.assembly.model import Assembly, Joining, Part, Source
 from technic.assembly.stiffness import StiffnessTable, default_table
 from technic.design.candidates import Candidate
 from technic.design.sites import NEW
 from technic.errors import UsageError
 from technic.geometry import Pose, nearest_orthogonal
-from technic.ldraw.connect import AxleSlide, connect
+from technic.ldraw.connect import AxleSlide
 from technic.ldraw.document import read
+from technic.ldraw.joining import rejoin
 from technic.ldraw.sections import document_from_text
 from technic.ldraw.syntax import Text
 from technic.ldraw.write import DECIMALS, NewPart, append_parts, save
 from technic.parts.catalogue import catalogue
 from technic.units import LDU
 
-__all__ = ["HIGHLIGHT", "Change", "change_of", "extend", "reinforced_text", "write_reinforced"]
+__all__ = [
+    "HIGHLIGHT",
+    "Change",
+    "change_of",
+    "extend",
+    "new_part",
+    "reinforced_text",
+    "write_reinforced",
+]
 
 HIGHLIGHT: Final = 25
 """Orange: the colour of new parts, rare enough in models to stand out."""
-
-
-INSIDE: Final = "inside/"
-"""How the connections of joints inside one divided part begin (`technic.ldraw.inner`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,25 +114,14 @@ def extend(
     for change in changes:
         for new in change.added:
             number += 1
-            parts.append(_part(new, number, step))
-    joints, findings = connect(
-        parts, table or default_table(), axle_slide=axle_slide, inner=_inside(assembly, parts)
-    )
-    return replace(assembly, parts=tuple(parts), joints=joints, findings=findings, supports=())
+            parts.append(new_part(new, number, step))
+    if assembly.joining is None:
+        assembly = replace(assembly, joining=Joining(table or default_table(), axle_slide))
+    return rejoin(assembly, parts)
 
 
-def _inside(assembly: Assembly, parts: Sequence[Part]) -> list[Joint]:
-    """Return the joints inside divided parts (motors, shock absorbers), for the parts as they are now."""
-    place = {part.id: k for k, part in enumerate(parts)}
-    out = []
-    for joint in assembly.joints:
-        if joint.connection.startswith(INSIDE):
-            first, second = (place[assembly.parts[k].id] for k in joint.parts)
-            out.append(replace(joint, parts=(first, second)))
-    return out
-
-
-def _part(new: NewPart, number: int, step: int) -> Part:
+def new_part(new: NewPart, number: int, step: int) -> Part:
+    """Return a new part as reading its line gives it; `number` counts the new parts from 1."""
     entry = catalogue().resolve(new.number)
     if entry is None:
         raise UsageError(f"part {new.number} is not in the catalogue")

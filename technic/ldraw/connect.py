@@ -7,7 +7,8 @@ stiffness table that it got its numbers from.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final, Literal
 
@@ -19,16 +20,38 @@ from technic.assembly.stiffness import ConnectionStiffness, StiffnessTable
 from technic.errors import UsageError
 from technic.geometry import Array, axes_from, readonly
 from technic.ldraw.findings import find
-from technic.ldraw.matching import Limits, Mating, match
+from technic.ldraw.matching import Limits, Matched, Mating, match
 from technic.ldraw.placed import PlacedPorts, collect
 from technic.ldraw.seats import Seat, seats
 from technic.ldraw.stops import missing_stops
 
-__all__ = ["AxleSlide", "connect"]
+__all__ = ["AxleSlide", "Links", "connect", "findings_of", "link"]
 
 AxleSlide = Literal["held", "free"]
 
 _STUD: Final = "stud/tube"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Links:
+    """The joints between parts, and what they were found from.
+
+    Parameters
+    ----------
+    joints : tuple of Joint
+        One for each pair of parts and line, in the order of the parts.
+    placed : PlacedPorts
+    matched : Matched
+    limits : Limits
+    ports : dict of str to tuple of int
+        The ports that each joint takes, by its id.
+    """
+
+    joints: tuple[Joint, ...]
+    placed: PlacedPorts
+    matched: Matched
+    limits: Limits
+    ports: Mapping[str, tuple[int, ...]]
 
 
 def connect(
@@ -56,9 +79,21 @@ def connect(
     Returns
     -------
     joints : tuple of Joint
-        One for each pair of parts and line, in the order of the parts.
     findings : tuple of Finding
     """
+    links = link(parts, table, axle_slide=axle_slide, limits=limits)
+    joints = (*links.joints, *inner)
+    return joints, findings_of(links, joints)
+
+
+def link(
+    parts: Sequence[Part],
+    table: StiffnessTable,
+    *,
+    axle_slide: AxleSlide = "held",
+    limits: Limits | None = None,
+) -> Links:
+    """Return the joints between parts with what they come from; see `connect`."""
     if axle_slide not in ("held", "free"):
         raise UsageError(f"axle_slide is 'held' or 'free', not {axle_slide!r}")
     limits = limits or Limits()
@@ -66,6 +101,7 @@ def connect(
     matched = match(placed, limits)
     missing = missing_stops(placed, matched.matings, gripped=axle_slide == "held", limits=limits)
     by_pair: dict[tuple[int, int], list[Joint]] = {}
+    ports: dict[str, tuple[int, ...]] = {}
     for group in _stud_groups(placed, matched.matings):
         first = matched.matings[group[0]]
         pair = _pair(placed, first)
@@ -75,12 +111,22 @@ def connect(
         else:
             joint = _joint(placed, first, table, joint_id, axle_slide, missing.get(group[0], ""))
         by_pair.setdefault(pair, []).append(joint)
+        ports[joint_id] = tuple(port for k in group for port in matched.matings[k].ports)
     for seat in seats(parts, limits):
         number = len(by_pair.get(seat.parts, [])) + 1
         joint_id = f"{parts[seat.parts[0]].id}~{parts[seat.parts[1]].id}@{number}"
         by_pair.setdefault(seat.parts, []).append(_seat(seat, table, joint_id))
-    joints = (*(joint for pair in sorted(by_pair) for joint in by_pair[pair]), *inner)
-    return joints, find(placed, matched, joints, limits)
+    joints = tuple(joint for pair in sorted(by_pair) for joint in by_pair[pair])
+    return Links(joints, placed, matched, limits, ports)
+
+
+def findings_of(links: Links, joints: Sequence[Joint]) -> tuple[Finding, ...]:
+    """Return what is worth a sentence when these are the joints, which may have been corrected.
+
+    A port whose joint was taken away is open again.
+    """
+    used = frozenset(port for joint in joints for port in links.ports.get(joint.id, ()))
+    return find(links.placed, replace(links.matched, used=used), joints, links.limits)
 
 
 @lru_cache(maxsize=4096)

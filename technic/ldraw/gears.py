@@ -28,7 +28,15 @@ from technic.groups import connected_groups
 from technic.parts.definition import Port, PortKind
 from technic.units import LDU, MM
 
-__all__ = ["Gear", "Mesh", "find_meshes", "gear_of", "mesh_findings", "mesh_joints"]
+__all__ = [
+    "Gear",
+    "Mesh",
+    "coupled",
+    "find_meshes",
+    "gear_of",
+    "mesh_findings",
+    "mesh_joints",
+]
 
 CONNECTION: Final = "gear/gear"
 """Key of the stiffness table."""
@@ -275,51 +283,58 @@ def _rack(rack: Gear, gear: Gear) -> _Touch | None:
 
 
 def mesh_joints(
-    parts: Sequence[Part], meshes: Sequence[Mesh], joints: Sequence[Joint], table: StiffnessTable
+    parts: Sequence[Part], meshes: Sequence[Mesh], table: StiffnessTable
 ) -> tuple[Joint, ...]:
-    """Return the joints of gears that hang together already.
-
-    Teeth hold gears in one direction only as long as something else keeps them at their distance: a
-    mesh between pieces that nothing else joins is left out.
-    """
-    groups = connected_groups(range(len(parts)), (joint.parts for joint in joints))
-    piece = {part: n for n, group in enumerate(groups) for part in group}
-    fixed = {
-        part: n
-        for n, group in enumerate(
-            connected_groups(range(len(parts)), (j.parts for j in joints if j.held.all()))
-        )
-        for part in group
-    }
+    """Return one joint for each mesh; `coupled` says which of them hold."""
     entry = table.get(CONNECTION)
     held = np.array(HELD[JointType.MESH])
     stiffness = np.where(held, entry.vector(), 0.0)
-    made = []
-    for mesh in meshes:
-        a, b = mesh.parts
-        if piece[a] != piece[b] or fixed[a] == fixed[b]:
-            continue
-        made.append(
-            Joint(
-                id=f"{parts[a].id}~{parts[b].id}@{mesh.kind}",
-                type=JointType.MESH,
-                parts=(a, b),
-                point=mesh.point,
-                axes=axes_from(mesh.direction),
-                held=held,
-                stiffness=stiffness,
-                connection=CONNECTION,
-                provenance=entry.provenance(held),
-            )
+    return tuple(
+        Joint(
+            id=f"{parts[mesh.parts[0]].id}~{parts[mesh.parts[1]].id}@{mesh.kind}",
+            type=JointType.MESH,
+            parts=mesh.parts,
+            point=mesh.point,
+            axes=axes_from(mesh.direction),
+            held=held,
+            stiffness=stiffness,
+            connection=CONNECTION,
+            provenance=entry.provenance(held),
         )
-    return tuple(made)
+        for mesh in meshes
+    )
+
+
+def coupled(joints: Sequence[Joint]) -> tuple[Joint, ...]:
+    """Return the meshes among the joints of a model that hold: of gears that hang together already.
+
+    Teeth hold gears in one direction only as long as something else keeps them at their distance: a
+    mesh between pieces that nothing else joins is left out, and so is one inside a rigid piece.
+    """
+    meshes = [joint for joint in joints if joint.type is JointType.MESH]
+    others = [joint for joint in joints if joint.type is not JointType.MESH]
+    ends = sorted({part for joint in joints for part in joint.parts})
+    piece = _pieces(ends, others)
+    fixed = _pieces(ends, [joint for joint in others if joint.held.all()])
+    return tuple(
+        mesh
+        for mesh in meshes
+        if piece[mesh.parts[0]] == piece[mesh.parts[1]]
+        and fixed[mesh.parts[0]] != fixed[mesh.parts[1]]
+    )
+
+
+def _pieces(members: Sequence[int], joints: Sequence[Joint]) -> dict[int, int]:
+    """Return for each part the number of the piece that these joints make it part of."""
+    groups = connected_groups(members, (joint.parts for joint in joints))
+    return {part: n for n, group in enumerate(groups) for part in group}
 
 
 def mesh_findings(
-    parts: Sequence[Part], meshes: Sequence[Mesh], coupled: Sequence[Joint] | None
+    parts: Sequence[Part], meshes: Sequence[Mesh], holding: Sequence[Joint] | None
 ) -> tuple[Finding, ...]:
-    """Return a sentence for each mesh; `coupled` are its joints, None when gears turn freely."""
-    joined = None if coupled is None else {joint.parts for joint in coupled}
+    """Return a sentence for each mesh; `holding` are the joints, None when gears turn freely."""
+    joined = None if holding is None else {joint.parts for joint in holding}
     return tuple(
         Finding(FindingKind.GEARS, _sentence(parts, mesh, joined), mesh.parts) for mesh in meshes
     )

@@ -71,6 +71,8 @@ class Mating:
         Middle of the stretch, on the female line (m).
     axis : (3,) ndarray
         Axis of the female port.
+    ports : tuple of int
+        All ports that it stands for, ascending; empty while they are not merged.
     """
 
     connection: str
@@ -81,6 +83,7 @@ class Mating:
     offset: float
     point: Array
     axis: Array
+    ports: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -248,8 +251,9 @@ def _same_line(first: Mating, second: Mating, limits: Limits) -> bool:
 
 def _strongest(line: list[Mating]) -> Mating:
     """Merge the matings of one line: the strongest kind, over the whole stretch they share."""
+    ports = tuple(sorted({port for mating in line for port in (mating.male, mating.female)}))
     if len(line) == 1:
-        return line[0]
+        return replace(line[0], ports=ports)
     best = min(
         line,
         key=lambda m: (_RANK[m.connection], -round((m.high - m.low) / LDU), m.male, m.female),
@@ -263,4 +267,4 @@ def _strongest(line: list[Mating]) -> Mating:
         half = (other.high - other.low) / 2.0
         low, high = min(low, middle - half), max(high, middle + half)
     point = origin + (low + high) / 2.0 * best.axis
-    return replace(best, low=low, high=high, point=point)
+    return replace(best, low=low, high=high, point=point, ports=ports)

@@ -18,18 +18,20 @@ from technic.assembly.model import (
     FindingKind,
     ImportedPart,
     ImportSummary,
+    Joining,
     Part,
     Source,
     UnknownPart,
 )
+from technic.assembly.overrides import read_overrides
 from technic.assembly.stiffness import StiffnessTable, default_table
 from technic.errors import InputError, UsageError
 from technic.geometry import Pose
-from technic.ldraw.connect import AxleSlide, connect
+from technic.ldraw.connect import AxleSlide
 from technic.ldraw.document import Document, Placement, placements, poses, read
 from technic.ldraw.finder import LibrarySource, PartFinder, ShadowSource
-from technic.ldraw.gears import find_meshes, mesh_findings, mesh_joints
 from technic.ldraw.inner import InnerMotion, divide
+from technic.ldraw.joining import join
 from technic.ldraw.library import LIBRARY_FAMILY
 from technic.parts.definition import PartDefinition
 
@@ -133,31 +135,19 @@ def load_ldraw(
             if find.library is None
             else "The parts library does not have them either.",
         )
-    table = table or default_table()
     whole = divide(reading.parts, inner)
-    parts = whole.parts
-    joints, findings = connect(parts, table, axle_slide=axle_slide, inner=whole.joints)
-    meshes = find_meshes(parts)
-    coupled = mesh_joints(parts, meshes, joints, table) if gears == "on" else None
     assembly = Assembly(
         name=Path(document.main.name).stem,
-        parts=parts,
-        joints=joints + (coupled or ()),
+        parts=whole.parts,
+        joints=whole.joints,
         unknown=reading.unknown,
-        findings=(
-            *reading.findings,
-            *findings,
-            *whole.findings,
-            *mesh_findings(parts, meshes, coupled),
-        ),
+        findings=(*reading.findings, *whole.findings),
         source={"path": str(path), "sha256": document.sha256, "format": "ldraw"},
         imported=_summary(reading.parts, find, searched=library is not None),
     )
-    if overrides is None:
-        return assembly
-    from technic.assembly.overrides import apply_overrides, read_overrides
-
-    return apply_overrides(assembly, read_overrides(overrides), overrides)
+    corrections = None if overrides is None else read_overrides(overrides)
+    how = Joining(table or default_table(), axle_slide, gears, corrections, str(overrides or ""))
+    return join(assembly, how)
 
 
 def lookup(library: LibrarySource = None, shadow: ShadowSource = None) -> PartFinder:
