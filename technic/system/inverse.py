@@ -23,6 +23,7 @@ __all__ = [
     "SHIFT",
     "SHIFT_SHARE",
     "ShiftedInverse",
+    "bordered_inverse",
     "orthonormal",
     "shifted_inverse",
     "single_thread",
@@ -98,8 +99,26 @@ def shifted_inverse(
     biggest = float(abs(stiffness.diagonal()).max(initial=0.0))
     lift, held = _lift(stiffness, measure, motions, SHIFT_SHARE * shift)
     matrix = sparse.csc_array(stiffness + lift + shift * measure)
-    solve = _bordered(_factor(matrix, constraints, biggest), measure @ held)
+    solve = bordered_inverse(matrix, constraints, measure @ held, biggest)
     return ShiftedInverse(matrix, solve, shift)
+
+
+def bordered_inverse(
+    matrix: sparse.csc_array, constraints: sparse.csr_array, border: Array, biggest: float
+) -> Inverse:
+    """Return the inverse of a regular matrix on what obeys constraints.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse
+    constraints : (c, n) sparse
+        Rows that may depend on each other.
+    border : (n, b) ndarray
+        Columns that what comes out is orthogonal to; independent of each other.
+    biggest : float
+        Stiffest spring on the diagonal.
+    """
+    return _bordered(_factor(matrix, constraints, biggest), border)
 
 
 def _lift(
