@@ -216,7 +216,7 @@ def test_directory_as_model_exits_with_3(run, tmp_path):
 
 
 def test_no_way_to_draw_exits_with_4_after_the_analysis(run, pair, tmp_path, monkeypatch):
-    def crash(_window):
+    def crash(*_how):
         return subprocess.Popen(
             [sys.executable, "-c", "import os; os.abort()"],
             stdin=subprocess.PIPE,

@@ -16,6 +16,7 @@ __all__ = [
     "AxleSlideOption",
     "CalibrationOption",
     "CsvOption",
+    "DepthOption",
     "FixOption",
     "Gears",
     "GearsOption",
@@ -36,9 +37,11 @@ __all__ = [
     "PartModelOption",
     "PictureOption",
     "QuietOption",
+    "RendererOption",
     "ReportOption",
     "RequireRigidOption",
     "ShadowOption",
+    "TransparentOption",
     "View",
     "ViewOption",
 ]
@@ -50,6 +53,7 @@ Gears = Literal["off", "on"]
 InnerMotion = Literal["held", "free"]
 PartModel = Literal["solid", "frame", "rigid"]
 View = Literal["iso", "front", "side", "top", "mode"]
+Renderer = Literal["pyvista", "pyrender"]
 """The values that `technic.rigidity.analyze.analyze`, the LDraw reader and the pictures take."""
 
 JsonOption = Annotated[
@@ -84,10 +88,23 @@ CsvOption = Annotated[
 ]
 AnimateOption = Annotated[
     Path | None,
-    typer.Option("--animate", metavar="GIF", help="Draw the worst mode as an animation."),
+    typer.Option(
+        "--animate", metavar="GIF|MP4", help="Draw the worst mode as an animation, .gif or .mp4."
+    ),
 ]
 ViewOption = Annotated[
     View, typer.Option("--view", help="Of pictures; mode: the view that shows the worst mode best.")
+]
+RendererOption = Annotated[
+    Renderer,
+    typer.Option("--renderer", help="What draws pictures; pyrender is an extra to install."),
+]
+TransparentOption = Annotated[
+    bool, typer.Option("--transparent", help="With --picture: leave the background out.")
+]
+DepthOption = Annotated[
+    bool,
+    typer.Option("--depth", help="With --picture: shades of distance instead of colours."),
 ]
 FixOption = Annotated[
     list[str] | None,
@@ -231,6 +248,9 @@ class AnalysisOptions:
     csv: Path | None = None
     animate: Path | None = None
     view: View = "mode"
+    renderer: Renderer = "pyvista"
+    transparent: bool = False
+    depth: bool = False
     how: ModelOptions = AS_FOUND
     fix: tuple[str, ...] = ()
     measure: Measure = "mean_square"

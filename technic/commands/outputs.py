@@ -13,6 +13,7 @@ from technic.errors import MissingDependency, UsageError
 
 if TYPE_CHECKING:
     from technic.report.render import Painter
+    from technic.report.scene import FilmKind
     from technic.rigidity.result import RigidityReport
 
 __all__ = ["Outputs"]
@@ -29,6 +30,8 @@ class Outputs:
     ------
     UsageError
         When a target cannot be written.
+    MissingDependency
+        When what draws or films is not installed.
     """
 
     def __init__(self, options: AnalysisOptions) -> None:
@@ -46,11 +49,19 @@ class Outputs:
                 check_writable(target)
         if options.csv is not None and not options.csv.is_dir():
             check_writable(options.csv)
+        self._film_kind: FilmKind = "gif"
+        if options.animate is not None and options.animate.suffix.lower() == ".mp4":
+            from technic.report.video import find_ffmpeg
+
+            find_ffmpeg()
+            self._film_kind = "mp4"
+        if (options.transparent or options.depth) and options.picture is None:
+            raise UsageError("--transparent and --depth are for --picture")
         self._painter: Painter | None = None
         if options.picture is not None or options.report is not None:
             from technic.report.render import Painter
 
-            self._painter = Painter()
+            self._painter = Painter(options.renderer)
 
     def __enter__(self) -> Outputs:
         return self
@@ -132,9 +143,10 @@ class Outputs:
 
         if not report.assembly.parts:
             raise UsageError("no film was made: the model has no part that was understood")
-        painter = Painter()
+        painter = Painter(self._options.renderer)
         try:
-            write_bytes(path, painter.picture(film(report, view=self._options.view)))
+            made = film(report, view=self._options.view, kind=self._film_kind)
+            write_bytes(path, painter.picture(made))
         finally:
             painter.close()
         self._said("animation", path)
@@ -142,7 +154,7 @@ class Outputs:
     def _draw(self, report: RigidityReport, painter: Painter) -> None:
         from technic.report.drawing import drawing_of
         from technic.report.files import write_bytes
-        from technic.report.picture import report_scene
+        from technic.report.picture import report_scene, styled
 
         options = self._options
         drawing = drawing_of(report.assembly) if report.assembly.parts else None
@@ -151,7 +163,9 @@ class Outputs:
             raise UsageError("no picture was drawn: the model has no part that was understood")
         if drawing is not None:
             try:
-                picture = painter.picture(report_scene(report, drawing=drawing, view=options.view))
+                scene = report_scene(report, drawing=drawing, view=options.view)
+                scene = styled(scene, transparent=options.transparent, depth=options.depth)
+                picture = painter.picture(scene)
             except MissingDependency as error:
                 problem = error
         if options.report is not None:

@@ -22,7 +22,7 @@ from technic.report.drawing import (
 from technic.report.motion_picture import MOTION_COLOR
 from technic.report.palette import NEUTRAL
 from technic.report.picture import headline, model_layers, outline
-from technic.report.scene import Film, LegendItem, Panel, Scene
+from technic.report.scene import Film, FilmKind, LegendItem, Panel, Scene
 from technic.report.worst_field import worst_field
 from technic.rigidity.result import MotionKind, RigidityReport
 from technic.rigidity.serialize import unit_load
@@ -72,7 +72,13 @@ def _motion(report: RigidityReport, drawing: Drawing) -> tuple[Poses, LegendItem
     return poses, LegendItem("arrow", MOTION_COLOR, f"what moves: motion 1 of {len(motions)}")
 
 
-def film(report: RigidityReport, *, drawing: Drawing | None = None, view: View = "mode") -> Film:
+def film(
+    report: RigidityReport,
+    *,
+    drawing: Drawing | None = None,
+    view: View = "mode",
+    kind: FilmKind = "gif",
+) -> Film:
     """Return the film of the worst mode; of the first motion when there is no elastic mode.
 
     Parameters
@@ -82,6 +88,7 @@ def film(report: RigidityReport, *, drawing: Drawing | None = None, view: View =
     drawing : Drawing, optional
         Of the report's assembly, when it is there already.
     view : {"iso", "front", "side", "top", "mode"}
+    kind : {"gif", "mp4"}
 
     Raises
     ------
@@ -109,4 +116,4 @@ def film(report: RigidityReport, *, drawing: Drawing | None = None, view: View =
         panel = Panel("", body, (edges, still), camera)
         scenes.append(Scene(title, subtitle, (panel,), (words,), _SIZE))
     order = (*range(half + 1), *range(half - 1, 0, -1))
-    return Film(tuple(scenes), order, _SECONDS)
+    return Film(tuple(scenes), order, _SECONDS, kind)

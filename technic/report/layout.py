@@ -50,7 +50,8 @@ class Sheet:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.image = Image.new("RGB", scene.size, "white")
+        paper = (255, 255, 255, 0 if scene.transparent else 255)
+        self.image = Image.new("RGBA", scene.size, paper)
         self._ink = ImageDraw.Draw(self.image)
         self._words = _font(21)
         self._small = _font(18)
@@ -117,7 +118,10 @@ class Sheet:
     def _item(self, x: int, y: int, item: LegendItem, text: str) -> None:
         color = _pixel(item.color)
         middle = y + 14
-        if item.swatch == "line":
+        if item.swatch == "patch":
+            box = (x, middle - 9, x + 44, middle + 9)
+            self._ink.rectangle(box, fill=color, outline=_RULE)
+        elif item.swatch == "line":
             self._ink.line([(x, middle), (x + 44, middle)], fill=color, width=2)
         elif item.swatch == "arrow":
             self._ink.line([(x, middle), (x + 32, middle)], fill=color, width=6)
@@ -141,7 +145,7 @@ class Sheet:
     ) -> None:
         """Put a drawn panel into its box, with caption, scale bar and markers."""
         left, top, right, bottom = box
-        self.image.paste(Image.fromarray(pixels), (left, top))
+        self.image.paste(Image.fromarray(pixels).convert("RGBA"), (left, top))
         if panel.caption:
             caption = self._shorten(panel.caption, self._caption, right - left)
             self._ink.text((left, self._caption_top), caption, font=self._caption, fill=_INK)

@@ -6,12 +6,15 @@ load (orange) over its undeformed outline, exaggerated by a stated factor.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from technic.geometry import Array
 from technic.parts.definition import PartDefinition
 from technic.report.arrows import arrow
 from technic.report.camera import View, fit, sight, view_direction
+from technic.report.canvas import FAR_SHADE, NEAR_SHADE, depth_span
 from technic.report.drawing import (
     Drawing,
     deformation_scale,
@@ -39,7 +42,7 @@ from technic.rigidity.result import RigidityReport, Verdict
 from technic.rigidity.serialize import unit_load
 from technic.units import MM
 
-__all__ = ["headline", "model_layers", "outline", "part_scene", "report_scene"]
+__all__ = ["headline", "model_layers", "outline", "part_scene", "report_scene", "styled"]
 
 OUTLINE: RGB = (0.55, 0.57, 0.60)
 SPOT_COLOR: RGB = (0.80, 0.07, 0.18)
@@ -250,6 +253,19 @@ def report_scene(
         )
     title, subtitle = headline(report)
     return Scene(title, subtitle, tuple(panels), tuple(legend))
+
+
+def styled(scene: Scene, *, transparent: bool = False, depth: bool = False) -> Scene:
+    """Return a scene without its paper, or in shades of depth, with the words for them."""
+    legend = scene.legend
+    if depth:
+        far = f"{number(depth_span(scene.panels) / MM)} mm behind the nearest point"
+        legend = (
+            LegendItem("patch", NEAR_SHADE, "nearest"),
+            LegendItem("patch", FAR_SHADE, far),
+            *legend,
+        )
+    return replace(scene, legend=legend, transparent=transparent, depth=depth)
 
 
 def part_scene(definition: PartDefinition) -> Scene:

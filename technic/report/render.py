@@ -6,18 +6,23 @@ the analysis survives, and can say what to install.
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import pickle
 import subprocess
 import sys
 from pathlib import Path
+from typing import Literal, get_args
 
 import technic
 from technic.errors import MissingDependency
 from technic.report.files import write_bytes
 from technic.report.scene import Film, Scene
 
-__all__ = ["Painter"]
+__all__ = ["RENDERERS", "Painter", "Renderer"]
+
+Renderer = Literal["pyvista", "pyrender"]
+RENDERERS: tuple[Renderer, ...] = get_args(Renderer)
 
 _WINDOWS = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
 """Ways of VTK to draw without a screen on Linux: through EGL, or through Mesa's software renderer."""
@@ -25,7 +30,7 @@ _WINDOWS = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
 _TIMEOUT_S = 300.0
 
 
-def _start(window: str | None) -> subprocess.Popen[bytes]:
+def _start(window: str | None, renderer: Renderer) -> subprocess.Popen[bytes]:
     environment = dict(os.environ)
     if window is not None:
         environment["VTK_DEFAULT_OPENGL_WINDOW"] = window
@@ -33,7 +38,7 @@ def _start(window: str | None) -> subprocess.Popen[bytes]:
     places = [str(Path(technic.__file__).parents[1]), environment.get("PYTHONPATH", "")]
     environment["PYTHONPATH"] = os.pathsep.join(place for place in places if place)
     return subprocess.Popen(
-        [sys.executable, "-m", "technic.report.draw"],
+        [sys.executable, "-m", "technic.report.draw", renderer],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -42,15 +47,31 @@ def _start(window: str | None) -> subprocess.Popen[bytes]:
 
 
 class Painter:
-    """A drawing process, started ahead so that it loads its libraries while others compute."""
+    """A drawing process, started ahead so that it loads its libraries while others compute.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    renderer : {"pyvista", "pyrender"}
+
+    Raises
+    ------
+    MissingDependency
+        When pyrender is wanted and not installed.
+    """
+
+    def __init__(self, renderer: Renderer = "pyvista") -> None:
+        if renderer == "pyrender" and importlib.util.find_spec("pyrender") is None:
+            raise MissingDependency(
+                "no picture was drawn: pyrender is not installed\n"
+                '  Install the extra: pip install "technic-rigidity[pyrender]"'
+            )
+        self._renderer = renderer
         chosen = os.environ.get("VTK_DEFAULT_OPENGL_WINDOW")
-        if chosen is not None or not sys.platform.startswith("linux"):
+        if renderer == "pyrender" or chosen is not None or not sys.platform.startswith("linux"):
             self._windows: list[str | None] = [chosen]
         else:
             self._windows = list(_WINDOWS)
-        self._process: subprocess.Popen[bytes] | None = _start(self._windows[0])
+        self._process: subprocess.Popen[bytes] | None = _start(self._windows[0], renderer)
 
     def draw(self, scene: Scene, path: Path) -> None:
         """Draw one scene into a PNG file.
@@ -65,7 +86,7 @@ class Painter:
         write_bytes(path, self.picture(scene))
 
     def picture(self, scene: Scene | Film) -> bytes:
-        """Return the picture of one scene as PNG, or of a film as GIF.
+        """Return the picture of one scene as PNG, or of a film as GIF or MP4.
 
         Raises
         ------
@@ -74,7 +95,7 @@ class Painter:
         """
         picture, why = None, ""
         for window in self._windows:
-            process = self._process or _start(window)
+            process = self._process or _start(window, self._renderer)
             self._process = None
             picture, why = _ask(process, scene)
             if picture is not None:
@@ -108,7 +129,9 @@ def _ask(process: subprocess.Popen[bytes], scene: Scene | Film) -> tuple[bytes |
         process.kill()
         process.communicate()
         return None, f"no answer within {_TIMEOUT_S:.0f} s"
-    if process.returncode == 0 and picture.startswith((b"\x89PNG", b"GIF8")):
+    if process.returncode == 0 and (
+        picture.startswith((b"\x89PNG", b"GIF8")) or picture[4:8] == b"ftyp"
+    ):
         return picture, ""
     lines = complaint.decode(errors="replace").strip().splitlines()
     return None, lines[-1].strip() if lines else f"exit code {process.returncode}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ __all__ = [
     "RGB",
     "Camera",
     "Film",
+    "FilmKind",
     "LegendItem",
     "Lines",
     "Marker",
@@ -24,6 +26,7 @@ __all__ = [
 
 Faces = NDArray[np.int64]
 RGB = tuple[float, float, float]
+FilmKind = Literal["gif", "mp4"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,13 +132,19 @@ class LegendItem:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A picture: title, panels side by side, legend below."""
+    """A picture: title, panels side by side, legend below.
+
+    With `transparent` the paper is left out; with `depth` the model is drawn in shades of its
+    distance from the eye instead of in its colours.
+    """
 
     title: str
     subtitle: str
     panels: tuple[Panel, ...]
     legend: tuple[LegendItem, ...]
     size: tuple[int, int] = (1600, 1200)
+    transparent: bool = False
+    depth: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,11 +159,14 @@ class Film:
         Which scene is shown when; a swing shows most of them twice.
     seconds : float
         That one round takes.
+    kind : {"gif", "mp4"}
+        An MP4 has a few rounds: not every player begins again by itself.
     """
 
     scenes: tuple[Scene, ...]
     order: tuple[int, ...]
     seconds: float
+    kind: FilmKind = "gif"
 
 
 def merge(surfaces: list[Surface], *, opacity: float = 1.0, on_top: bool = False) -> Surface:

@@ -34,7 +34,7 @@ def run(monkeypatch, capsys):
 def no_drawing(monkeypatch) -> None:
     """A machine on which VTK kills its process."""
 
-    def crash(_window):
+    def crash(*_how):
         return subprocess.Popen(
             [sys.executable, "-c", "import os; os.abort()"],
             stdin=subprocess.PIPE,

@@ -173,7 +173,7 @@ def test_picture_of_a_part(tmp_path):
 
 
 def test_machine_that_cannot_draw_is_told_what_to_install(pair, tmp_path, monkeypatch):
-    def crash(_window):
+    def crash(*_how):
         return subprocess.Popen(
             [sys.executable, "-c", "import os; os.abort()"],
             stdin=subprocess.PIPE,

@@ -78,7 +78,8 @@ def _embedded(picture: bytes) -> str:
     """Return a PNG as a smaller picture in a data address."""
     from PIL import Image
 
-    image = Image.open(io.BytesIO(picture)).convert("RGB")
+    image = Image.open(io.BytesIO(picture)).convert("RGBA")
+    image = Image.alpha_composite(Image.new("RGBA", image.size, "white"), image).convert("RGB")
     if image.width > _PICTURE_WIDTH:
         height = round(image.height * _PICTURE_WIDTH / image.width)
         image = image.resize((_PICTURE_WIDTH, height), Image.Resampling.LANCZOS)
