@@ -16,13 +16,14 @@ import numpy as np
 
 from technic.errors import InputError
 from technic.geometry import Array
-from technic.ldraw.library import LIBRARY_FAMILY, Library
+from technic.ldraw.library import Library
 from technic.ldraw.primitives import ports_from_primitives
 from technic.ldraw.shadow import ShadowLibrary
 from technic.ldraw.shadow_ports import ports_from_shadow
 from technic.ldraw.triangles import Surface, surface_of
 from technic.ldraw.undersides import stud_places
 from technic.parts.definition import (
+    LIBRARY_FAMILY,
     Drawing,
     MassProperties,
     PartDefinition,
@@ -30,6 +31,7 @@ from technic.parts.definition import (
     PortKind,
     RigidBody,
 )
+from technic.parts.inner import inner_parts
 from technic.parts.materials import material
 from technic.units import MM, PITCH
 
@@ -71,7 +73,8 @@ def definition_from_library(
     shadow : ShadowLibrary, optional
         Its ports win over those from primitives, where it describes the part.
     solids : {"draft", "fine", "off"}
-        How finely the part is meshed when an analysis wants its solid model; off: never.
+        How finely the part is meshed when an analysis wants its solid model; off: never. Parts that
+        move inside are never meshed: they are no single solid.
 
     Returns
     -------
@@ -110,10 +113,14 @@ def definition_from_library(
         mass_properties=mass,
         fastener=is_fastener(ports, title, surface),
         source=f"LDraw library {resolved.key}; {origin}; {measured}",
-        drawing=None
-        if solids == "off"
-        else Drawing(partial(_triangles, library, number, fine=solids == "fine"), CELLS[solids]),
+        drawing=_drawing(library, number, solids),
     )
+
+
+def _drawing(library: Library, number: str, solids: Solids) -> Drawing | None:
+    if solids == "off" or number.lower().removesuffix(".dat") in inner_parts():
+        return None
+    return Drawing(partial(_triangles, library, number, fine=solids == "fine"), CELLS[solids])
 
 
 def _triangles(library: Library, number: str, *, fine: bool) -> Array:

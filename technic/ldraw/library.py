@@ -26,7 +26,6 @@ from technic.geometry import Array, readonly
 from technic.ldraw.storage import Store, open_store
 
 __all__ = [
-    "LIBRARY_FAMILY",
     "Library",
     "PartFile",
     "Reference",
@@ -38,9 +37,6 @@ __all__ = [
 
 FOLDERS: Final = ("parts/", "p/", "models/", "unofficial/parts/", "unofficial/p/")
 """Folders of a library in the order in which a reference is looked up."""
-
-LIBRARY_FAMILY: Final = "library"
-"""Family of every definition that is made from library files."""
 
 MAX_MOVES: Final = 16
 """Longest chain of moved-to stubs that is followed; real ones have at most three links."""

@@ -32,8 +32,7 @@ from technic.ldraw.document import Document, Placement, placements, poses, read
 from technic.ldraw.finder import LibrarySource, PartFinder, ShadowSource
 from technic.ldraw.inner import InnerMotion, divide
 from technic.ldraw.joining import join
-from technic.ldraw.library import LIBRARY_FAMILY
-from technic.parts.definition import PartDefinition
+from technic.parts.definition import LIBRARY_FAMILY, PartDefinition
 
 if TYPE_CHECKING:
     from technic.ldraw.imported import Solids

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from technic.geometry import Array, readonly
 
 __all__ = [
+    "LIBRARY_FAMILY",
     "Body",
     "Drawing",
     "FrameBody",
@@ -31,6 +32,10 @@ __all__ = [
     "TrussBody",
     "outline",
 ]
+
+
+LIBRARY_FAMILY: Final = "library"
+"""Family of every definition that is made from files of a parts library."""
 
 
 class PortKind(StrEnum):

@@ -1,4 +1,6 @@
-"""What a part becomes in the system: a solid model where one is shipped, its own body, a rigid body."""
+"""What a part becomes in the system: a solid model (shipped, or made from its drawing), its own body,
+a rigid body.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +12,11 @@ from typing import Final, Literal
 from technic.assembly.model import Assembly, Part
 from technic.fem.build import build_element
 from technic.fem.element import Element
-from technic.fem.solid.store import load
 from technic.fem.solid.superelement import super_element_to_element
 from technic.geometry import Array, shift_twist
-from technic.parts.definition import RigidBody
+from technic.parts.definition import LIBRARY_FAMILY, RigidBody
+from technic.system.drawn_solids import outcome_of, solid_model
+from technic.system.solid_cache import Refusal
 
 __all__ = [
     "FACTORIES",
@@ -77,11 +80,11 @@ def rigid_element_of(part: Part, points: Array, _ports: tuple[str | None, ...]) 
 
 
 def solid_element_of(part: Part, points: Array, ports: tuple[str | None, ...]) -> Element:
-    """Return the condensed solid model of a part; its own body's element where none is shipped.
+    """Return the condensed solid model of a part; its own body's element where it has none.
 
     The mass is scaled to the part's own, so that models of either kind weigh the same.
     """
-    condensed = None if part.definition is None else load(part.definition)
+    condensed = None if part.definition is None else solid_model(part.definition)
     if condensed is None:
         return element_of(part, points, ports)
     known = {*condensed.ports, *(name for name, _ in condensed.merged)}
@@ -111,7 +114,7 @@ def model_of(part: Part, parts: str) -> str:
     parts : str
         What was asked for.
     """
-    if parts == "solid" and part.definition is not None and load(part.definition) is not None:
+    if parts == "solid" and part.definition is not None and solid_model(part.definition):
         return "solid"
     return "rigid" if parts == "rigid" or isinstance(part.body, RigidBody) else "frame"
 
@@ -147,4 +150,10 @@ def _reason(part: Part) -> str:
         return "a pin or small connector: its give is in the joints"
     if part.fastener:
         return "a bar between its joints, with its true section"
-    return "no solid model is shipped"
+    if part.definition is None or part.definition.family != LIBRARY_FAMILY:
+        return "no solid model is shipped"
+    if part.definition.drawing is None:
+        return "from the parts library: it moves inside, or meshing is turned off"
+    made = outcome_of(part.definition)
+    assert isinstance(made, Refusal)  # or it would be solid
+    return made.reason
