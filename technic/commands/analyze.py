@@ -34,6 +34,7 @@ from technic.commands.options import (
 )
 from technic.commands.outputs import Outputs
 from technic.commands.reading import model_options, reading
+from technic.commands.solids import make_solids
 
 if TYPE_CHECKING:
     from technic.rigidity.result import RigidityReport
@@ -93,6 +94,7 @@ def run(model: Path, options: AnalysisOptions) -> None:
         if options.fix:
             supports = tuple(parse_fix(assembly, text) for text in options.fix)
             assembly = replace(assembly, supports=assembly.supports + supports)
+        make_solids(assembly, options.parts, quiet=options.quiet)
         report = analyze_assembly(
             assembly,
             measure=options.measure,

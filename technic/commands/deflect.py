@@ -18,6 +18,7 @@ from technic.commands.options import (
     QuietOption,
 )
 from technic.commands.reading import model_options, reading
+from technic.commands.solids import make_solids
 from technic.errors import UsageError
 
 if TYPE_CHECKING:
@@ -118,6 +119,7 @@ def deflect(
         loads += [parse_hang(assembly, text, way) for text in hang or ()]
         weight = GRAVITY * way if gravity else None
     probes = tuple(parse_probe(assembly, text) for text in probe or ())
+    make_solids(assembly, parts, quiet=quiet)
     answer = solve(assembly, tuple(loads), gravity=weight, probes=probes, element=FACTORIES[parts])
     intervals: tuple[tuple[float, float] | None, ...] = ()
     if "table" in options:

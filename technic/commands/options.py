@@ -26,6 +26,8 @@ __all__ = [
     "InnerOption",
     "JsonOption",
     "LibraryOption",
+    "LibrarySolids",
+    "LibrarySolidsOption",
     "Measure",
     "MeasureOption",
     "MinRigidityOption",
@@ -51,6 +53,7 @@ Measure = Literal["mean_square", "nodal"]
 AxleSlide = Literal["held", "free"]
 Gears = Literal["off", "on"]
 InnerMotion = Literal["held", "free"]
+LibrarySolids = Literal["draft", "fine", "off"]
 PartModel = Literal["solid", "frame", "rigid"]
 View = Literal["iso", "front", "side", "top", "mode"]
 Renderer = Literal["pyvista", "pyrender"]
@@ -161,6 +164,14 @@ LibraryOption = Annotated[
         "or the usual places.",
     ),
 ]
+LibrarySolidsOption = Annotated[
+    LibrarySolids,
+    typer.Option(
+        "--library-solids",
+        help="How parts of the library are meshed: draft (1.6 mm), fine (0.8 mm, like the shipped "
+        "models: up to minutes and gigabytes a part), off (rigid bodies). Kept in the cache.",
+    ),
+]
 NoLibraryOption = Annotated[
     bool, typer.Option("--no-library", help="Do not use a parts library, even if there is one.")
 ]
@@ -218,6 +229,8 @@ class ModelOptions:
         LDraw parts library; None: the one that is found in the usual places, if there is one.
     no_library : bool
         Do not look for one.
+    library_solids : {"draft", "fine", "off"}
+        How finely parts of the library are meshed.
     shadow : Path or None
         LDCad shadow library.
     """
@@ -229,6 +242,7 @@ class ModelOptions:
     overrides: Path | None = None
     library: Path | None = None
     no_library: bool = False
+    library_solids: LibrarySolids = "draft"
     shadow: Path | None = None
 
 

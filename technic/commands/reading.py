@@ -19,6 +19,7 @@ from technic.commands.options import (
     GearsOption,
     InnerOption,
     LibraryOption,
+    LibrarySolidsOption,
     ModelOptions,
     NoLibraryOption,
     OverridesOption,
@@ -37,6 +38,7 @@ _OPTIONS: Final[dict[str, Any]] = {
     "overrides": OverridesOption,
     "library": LibraryOption,
     "no_library": NoLibraryOption,
+    "library_solids": LibrarySolidsOption,
     "shadow": ShadowOption,
 }
 """The command-line option of each field of `ModelOptions`."""
@@ -122,7 +124,8 @@ def reading(model: Path, how: ModelOptions) -> dict[str, Any]:
             )
         if how != ModelOptions(no_library=how.no_library):
             raise UsageError(
-                "--library, --shadow, --gears, --inner and --overrides are for LDraw models"
+                "--library, --library-solids, --shadow, --gears, --inner and --overrides are for "
+                "LDraw models"
             )
         return {}
     options: dict[str, Any] = {
@@ -130,6 +133,7 @@ def reading(model: Path, how: ModelOptions) -> dict[str, Any]:
         "gears": how.gears,
         "inner": how.inner,
         "overrides": how.overrides,
+        "solids": how.library_solids,
         **_sources(how),
     }
     if how.calibration is not None:

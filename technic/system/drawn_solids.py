@@ -299,6 +299,8 @@ def prepare(
             found.setdefault(request.key, (definition, request))
     missing = [entry for entry in found.values() if _recalled(entry[1]) is None]
     draft = all(request.settings.cell >= DRAFT_FROM for _, request in missing)
+    if missing and progress is not None:
+        progress(0, len(missing), "")
     workers = min(jobs or ((os.cpu_count() or 1) if draft else 1), len(missing))
     if workers <= 1:
         for done, (definition, request) in enumerate(missing, 1):
