@@ -249,7 +249,7 @@ def _unknown(report: RigidityReport, style: Style) -> list[str]:
 
 def _imported(report: RigidityReport, style: Style) -> list[str]:
     imported = report.assembly.imported
-    effects = import_effects(report.assembly)
+    effects = import_effects(report.assembly, report.library_models)
     if imported is None or not effects:
         return []
     read = sum(part.count for part in imported.from_library)

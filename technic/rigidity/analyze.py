@@ -37,6 +37,7 @@ from technic.rigidity.uncertainty import rigidity_interval
 from technic.rigidity.worst_case import mode_of, node_fields, rigid_parts, weak_spots
 from technic.system.assemble import System, assemble
 from technic.system.inverse import single_thread
+from technic.system.library_models import library_models
 from technic.system.part_models import FACTORIES, PartModel, models_of, plain_parts
 from technic.tolerances import MAIN_COMPONENT_SHARE, MOBILITY_GAP
 
@@ -139,6 +140,7 @@ def analyze(
         unknowns=system.size,
         part_models=models_of(assembly, parts),
         plain_parts=plain_parts(assembly, parts),
+        library_models=library_models(assembly, parts),
         mass=system.mass,
         qualifier=_qualifier(assembly),
         not_modelled=not_modelled(assembly),

@@ -11,6 +11,7 @@ from typing import Any
 
 from technic.assembly.model import Assembly
 from technic.geometry import Array, readonly
+from technic.system.library_models import LibraryModels
 from technic.system.part_models import PlainPart
 
 __all__ = [
@@ -237,6 +238,8 @@ class RigidityReport:
         How many parts are solid models, frame members, rigid bodies.
     plain_parts : tuple of PlainPart
         The kinds of part without a solid model, when solid models were asked for.
+    library_models : LibraryModels
+        What the parts from a parts library are.
     qualifier : str
         "", "at least" or "at most": how the count of motions is to be read.
     not_modelled : tuple of str
@@ -260,6 +263,7 @@ class RigidityReport:
     mass: float
     part_models: Mapping[str, int] = field(default_factory=dict)
     plain_parts: tuple[PlainPart, ...] = ()
+    library_models: LibraryModels = field(default_factory=LibraryModels)
     qualifier: str = ""
     not_modelled: tuple[str, ...] = ()
     timings: Mapping[str, float] = field(default_factory=dict)

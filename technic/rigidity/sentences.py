@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 
 from technic.assembly.joint_types import JointType
@@ -10,6 +12,7 @@ from technic.geometry import Array
 from technic.parts.definition import PortKind
 from technic.rigidity.result import Mobility, Motion, MotionKind, MotionType, Verdict
 from technic.rigidity.screw import describe_twists
+from technic.system.library_models import LibraryModels
 from technic.tolerances import MOBILITY_LENGTH, MOTION_KIND_CUT, SAME_LINE
 from technic.units import MM
 
@@ -62,6 +65,10 @@ def _groups(assembly: Assembly, motion: Motion) -> list[tuple[list[int], Array]]
 
 def _parts(count: int) -> str:
     return "1 part" if count == 1 else f"{count} parts"
+
+
+def _are(count: int) -> str:
+    return "is" if count == 1 else "are"
 
 
 def _who(assembly: Assembly, parts: list[int]) -> str:
@@ -175,8 +182,15 @@ def reason(
     return f"Parts that carry structure can move against the rest in {ways}."
 
 
-def import_effects(assembly: Assembly) -> tuple[str, ...]:
-    """Say what the origin of a model's parts means for the answer, one sentence each."""
+def import_effects(assembly: Assembly, models: LibraryModels | None = None) -> tuple[str, ...]:
+    """Say what the origin of a model's parts means for the answer, one sentence each.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    models : LibraryModels, optional
+        What the parts from a library are; None: not said.
+    """
     imported, out = assembly.imported, []
     if imported is None:
         return ()
@@ -188,15 +202,25 @@ def import_effects(assembly: Assembly) -> tuple[str, ...]:
         )
         if not imported.library:
             out.append(
-                "With an LDraw parts library their connectors would be read from their drawings: "
+                "With an LDraw parts library their connectors, mass and stiffness would be read from "
+                "their drawings: "
                 "`technic parts fetch` downloads it"
                 + ("." if imported.searched else ", or leave --no-library out.")
             )
-    read = sum(part.count for part in imported.from_library)
-    if read:
+    if models is not None and models.solid:
         out.append(
-            f"{_parts(read)} from the library are taken as rigid bodies: of them, the rigidity "
-            "counts the joints, not their own bending."
+            f"{_parts(models.solid)} from the library {_are(models.solid)} meshed from the drawing, "
+            f"with cells of {models.cell / MM:.3g} mm."
+        )
+    if models is not None and models.rigid:
+        why: Counter[str] = Counter()
+        for kind in models.rigid:
+            why[kind.reason] += kind.count
+        said = "; ".join(f"{reason} ({count})" for reason, count in why.most_common())
+        rigid = models.rigid_count
+        out.append(
+            f"{_parts(rigid)} from the library {_are(rigid)} taken as rigid: there the rigidity counts "
+            f"the joints, not the part's own bending. Why: {said}."
         )
     return tuple(out)
 

@@ -307,7 +307,9 @@ def _imported(report: RigidityReport) -> dict[str, Any] | None:
         "shadow": imported.shadow or None,
         "known": imported.catalogue,
         "from_library": sum(part.count for part in imported.from_library),
-        "rigid_by_choice": sum(part.count for part in imported.from_library),
+        "solid_models": report.library_models.solid,
+        "rigid_by_choice": report.library_models.rigid_count,
+        "rigid_parts": [kind.to_dict() for kind in report.library_models.rigid],
         "unknown": sum(part.count for part in report.assembly.unknown),
         "library_parts": [
             {
@@ -318,7 +320,7 @@ def _imported(report: RigidityReport) -> dict[str, Any] | None:
             }
             for part in imported.from_library
         ],
-        "effect": list(import_effects(report.assembly)),
+        "effect": list(import_effects(report.assembly, report.library_models)),
     }
 
 

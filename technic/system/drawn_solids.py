@@ -104,7 +104,7 @@ def _request(definition: PartDefinition) -> _Request | Refusal:
         return Refusal("a pin or small connector: its give is in the joints")
     ports = frame_ports(definition)
     if len(ports) < 2:
-        return Refusal("fewer than two connections: nothing to bend between")
+        return Refusal("fewer than two connections to bend between")
     if len(ports) > MOST_PORTS:
         return Refusal(
             f"it has {len(ports)} connections, more than the {MOST_PORTS} of a solid model"

@@ -52,5 +52,6 @@ def test_an_ldraw_file_passes_them_on(tmp_path):
         "axle_slide": "held",
         "gears": "on",
         "inner": "free",
+        "solids": "draft",
         "overrides": tmp_path / "o.toml",
     }
