@@ -12,7 +12,7 @@ import numpy as np
 from technic.assembly.joint_types import JointType
 from technic.assembly.stiffness import StiffnessTable
 from technic.geometry import Array, Pose, readonly
-from technic.parts.definition import Body, MassProperties, PartDefinition, Port
+from technic.parts.definition import Body, MassProperties, Material, PartDefinition, Port
 
 __all__ = [
     "Assembly",
@@ -78,6 +78,8 @@ class Part:
         None for shapes of an assembly file.
     shape : mapping
         Shape of an assembly file, in part coordinates; empty for parts of a catalogue.
+    material : Material or None
+        What the user says it is made of; None: what its definition or its body says.
     """
 
     id: str
@@ -92,6 +94,7 @@ class Part:
     source: Source | None = None
     definition: PartDefinition | None = None
     shape: Mapping[str, Any] = field(default_factory=dict)
+    material: Material | None = None
 
     @property
     def centroid(self) -> Array:

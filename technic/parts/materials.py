@@ -8,10 +8,10 @@ from importlib.resources import files
 from typing import Any
 
 from technic.errors import UsageError
-from technic.parts.definition import Material, Section
+from technic.parts.definition import Material, PartDefinition, Section
 from technic.units import MM
 
-__all__ = ["ABS", "material", "materials", "sections"]
+__all__ = ["ABS", "material", "material_of", "materials", "sections"]
 
 ABS = "ABS"
 """Name of the material of everything that names none."""
@@ -50,6 +50,12 @@ def material(name: str = ABS) -> Material:
     except KeyError:
         known = ", ".join(sorted(materials()))
         raise UsageError(f"no material {name!r}; known: {known}") from None
+
+
+def material_of(definition: PartDefinition) -> Material:
+    """Return what a part is made of, by its catalogue entry; ABS when it says nothing."""
+    name = definition.shape.get("material")
+    return material(str(name) if name else ABS)
 
 
 @functools.cache

@@ -12,9 +12,10 @@ from typing import Final, Literal
 from technic.assembly.model import Assembly, Part
 from technic.fem.build import build_element
 from technic.fem.element import Element
-from technic.fem.solid.superelement import super_element_to_element
+from technic.fem.solid.superelement import SuperElement, super_element_to_element
 from technic.geometry import Array, shift_twist
 from technic.parts.definition import LIBRARY_FAMILY, RigidBody
+from technic.parts.materials import material_of
 from technic.system.drawn_solids import outcome_of, solid_model
 from technic.system.solid_cache import Refusal
 
@@ -23,7 +24,9 @@ __all__ = [
     "ElementFactory",
     "PartModel",
     "PlainPart",
+    "element_from",
     "element_of",
+    "framed",
     "model_of",
     "models_of",
     "plain_parts",
@@ -87,14 +90,40 @@ def solid_element_of(part: Part, points: Array, ports: tuple[str | None, ...]) -
     condensed = None if part.definition is None else solid_model(part.definition)
     if condensed is None:
         return element_of(part, points, ports)
-    known = {*condensed.ports, *(name for name, _ in condensed.merged)}
-    framed = [name if name in known else None for name in ports]  # studs have no frame of their own
-    element, _ = super_element_to_element(condensed, framed, points)
+    return element_from(condensed, part, points, ports)
+
+
+def element_from(
+    condensed: SuperElement, part: Part, points: Array, ports: tuple[str | None, ...]
+) -> Element:
+    """Return the element of a part that a condensed model stands for; its mass is that of the part."""
+    element, _ = super_element_to_element(condensed, framed(condensed, ports), points)
     # the system takes rigid motions about the part's centroid, not that of the solid model
     arm = condensed.centroid - part.mass_properties.centroid
     rigid = element.rigid @ shift_twist(arm)
     present = float(rigid[:, 0] @ element.mass @ rigid[:, 0])
-    return replace(element, mass=element.mass * (part.mass_properties.mass / present), rigid=rigid)
+    return replace(
+        element,
+        stiffness=element.stiffness * _stiffer(part),
+        mass=element.mass * (part.mass_properties.mass / present),
+        rigid=rigid,
+    )
+
+
+def framed(condensed: SuperElement, ports: tuple[str | None, ...]) -> list[str | None]:
+    """Return the ports that have a frame; None for studs, say, which take the nearest one."""
+    known = {*condensed.ports, *(name for name, _ in condensed.merged)}
+    return [name if name in known else None for name in ports]
+
+
+def _stiffer(part: Part) -> float:
+    """Return how much stiffer the material chosen for a part is than the one of its definition.
+
+    Exact for equal Poisson's ratios; `assembly.materials` says so where they differ.
+    """
+    if part.material is None or part.definition is None:
+        return 1.0
+    return part.material.young_pa / material_of(part.definition).young_pa
 
 
 FACTORIES: Final[dict[str, ElementFactory]] = {

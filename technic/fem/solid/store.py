@@ -26,12 +26,13 @@ from technic.errors import InputError, TechnicError
 from technic.fem.solid.settings import MeshSettings
 from technic.fem.solid.superelement import SuperElement
 from technic.parts.definition import Material, PartDefinition, Port, PortKind
-from technic.parts.materials import ABS, material
+from technic.parts.materials import material_of
 
 __all__ = [
     "FILE",
     "build",
     "element_key",
+    "fitting",
     "has_solid_model",
     "load",
     "material_of",
@@ -39,6 +40,7 @@ __all__ = [
     "shape_key",
     "solid_ports",
     "stored",
+    "stored_shape",
     "write",
 ]
 
@@ -80,12 +82,6 @@ Progress = Callable[[str, str | None], None]
 """Called with the part's id and None, or the reason why it has no solid model."""
 
 
-def material_of(definition: PartDefinition) -> Material:
-    """Return what a part is made of, by its catalogue entry; ABS when it says nothing."""
-    name = definition.shape.get("material")
-    return material(str(name) if name else ABS)
-
-
 def solid_ports(definition: PartDefinition) -> tuple[Port, ...]:
     """Return the ports that get a frame.
 
@@ -111,7 +107,7 @@ def has_solid_model(definition: PartDefinition) -> bool:
     )
 
 
-def _fitting(settings: MeshSettings, volume: float) -> MeshSettings:
+def fitting(settings: MeshSettings, volume: float) -> MeshSettings:
     """Return the settings with cells so much larger that a big part fits into memory.
 
     Raises
@@ -233,7 +229,7 @@ def _build_one(definition: PartDefinition, settings: MeshSettings) -> SuperEleme
                 np.asarray(surface.triangles),
                 solid_ports(definition),
                 made_of,
-                _fitting(settings, float(surface.volume)),
+                fitting(settings, float(surface.volume)),
                 key=key,
             )
     except TechnicError as fault:
@@ -349,6 +345,15 @@ def stored() -> tuple[str, ...]:
     """Return the ids of the parts in the shipped file."""
     archive = _archive()
     return () if archive is None else tuple(archive.namelist())
+
+
+def stored_shape(part: str) -> str:
+    """Return the `shape_key` that a part's shipped super-element was built from, "" when it has none."""
+    archive = _archive()
+    if archive is None or part not in archive.NameToInfo:
+        return ""
+    with archive.open(part) as member:
+        return str(json.loads(member.readline())["shape"])
 
 
 @functools.lru_cache(maxsize=1024)

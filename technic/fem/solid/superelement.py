@@ -13,7 +13,13 @@ from technic.errors import UsageError
 from technic.fem.element import Element
 from technic.geometry import Array, readonly, shift_twist
 
-__all__ = ["SuperElement", "elastic_eigenvalues", "rigid_motions", "super_element_to_element"]
+__all__ = [
+    "SuperElement",
+    "elastic_eigenvalues",
+    "frames_in_use",
+    "rigid_motions",
+    "super_element_to_element",
+]
 
 MASS_ERROR = 1e-2
 """Ports are kept for the mass until the lowest `KEPT_MODES` eigenvalues of the free part are met within
@@ -213,9 +219,7 @@ def super_element_to_element(
     UsageError
         A port is unknown, or None stands without an attachment.
     """
-    at = [_port_of(element, name, i, attachments) for i, name in enumerate(used)]
-    middle = int(np.argmin(np.linalg.norm(element.points - element.centroid, axis=1)))
-    kept, error = _keep_for_mass(element, at or [middle])
+    at, kept, error = frames_in_use(element, used, attachments)
     stiffness, mass = _condense(element, kept)
     points = element.points[kept]
     size = 6 * len(kept)
@@ -236,6 +240,19 @@ def super_element_to_element(
         ),
         error,
     )
+
+
+def frames_in_use(
+    element: SuperElement, used: Sequence[str | None], attachments: Array | None = None
+) -> tuple[list[int], list[int], float]:
+    """Return the port of each attachment, all ports that are kept, and the error of leaving out the rest.
+
+    Parameters are those of `super_element_to_element`.
+    """
+    at = [_port_of(element, name, i, attachments) for i, name in enumerate(used)]
+    middle = int(np.argmin(np.linalg.norm(element.points - element.centroid, axis=1)))
+    kept, error = _keep_for_mass(element, at or [middle])
+    return at, kept, error
 
 
 def _port_of(

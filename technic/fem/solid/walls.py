@@ -2,7 +2,11 @@
 
 A pin that fits tightly stops its bore from changing shape; the default frames (a mean over the bore)
 let it. Here every sample of a port's surface is tied to the port's frame by a stiff spring. Ports that
-carry nothing must stay out: with rigid walls in every bore a liftarm comes out four times too stiff.
+carry nothing must stay out: with rigid walls in every bore a liftarm comes out four times too stiff. Where
+the mass needs the frame of such a port, it is a mean over the bore as ever (`free`): with
+``u = L q + X r``, L = the mesh's answer to the tied frames q and ``X = K^-1 C^T`` that to the forces r on
+the free ones, ``C u = p`` gives ``r = F^-1 (p - C L q)``, ``F = C X``; the two kinds of answer do no work on
+each other, so the energies add up.
 """
 
 from __future__ import annotations
@@ -11,12 +15,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from technic.errors import InputError
 from technic.fem.solid.cells import CELL_NODES, shape_functions
 from technic.fem.solid.condense import element_stiffness, mass_and_centroid, mass_matrix
-from technic.fem.solid.grid import Mesh, MeshSettings, mesh_part
-from technic.fem.solid.ports import Samples, sample_port, wall_rows
+from technic.fem.solid.grid import Mesh, mesh_part
+from technic.fem.solid.ports import Samples, frame_rows, sample_port, wall_rows
+from technic.fem.solid.settings import MeshSettings
 from technic.fem.solid.solver import factorize
 from technic.fem.solid.superelement import SuperElement, project_rigid, rigid_motions
 from technic.geometry import Array
@@ -36,6 +42,7 @@ def build_with_rigid_walls(
     material: Material,
     settings: MeshSettings | None = None,
     *,
+    free: Sequence[Port] = (),
     key: str = "",
 ) -> SuperElement:
     """Condense a part onto ports whose surfaces keep their shape.
@@ -49,6 +56,8 @@ def build_with_rigid_walls(
         The ports that carry a joint, and only these.
     material : Material
     settings : MeshSettings, optional
+    free : sequence of Port
+        Ports that get a frame but no rigid wall; they come after the used ones.
     key : str
 
     Returns
@@ -88,15 +97,25 @@ def build_with_rigid_walls(
         coupling[:, at] = displacement.T @ scaled
         own[at, at] = rigid.T @ scaled
     lift = factor.solve(coupling)
-    points = np.array([port.position for port in used])
-    mass = mass_matrix(mesh, material.density)
-    moved = np.asarray(mass @ lift.reshape(len(mesh.points), -1)).reshape(lift.shape)
-    condensed = lift.T @ moved
     stiffness = own - coupling.T @ lift
+    if free:
+        rows = sparse.vstack([frame_rows(mesh, port, sample_port(mesh, port)) for port in free])
+        answers = factor.solve(rows.T.toarray())
+        flexibility = rows @ answers
+        inverse = np.linalg.inv((flexibility + flexibility.T) / 2.0)
+        moved = rows @ lift
+        held = inverse @ moved
+        stiffness = np.block([[stiffness + moved.T @ held, -held.T], [-held, inverse]])
+        lift = np.hstack([lift - answers @ held, answers @ inverse])
+    ports = [*used, *free]
+    points = np.array([port.position for port in ports])
+    mass = mass_matrix(mesh, material.density)
+    carried = np.asarray(mass @ lift.reshape(len(mesh.points), -1)).reshape(lift.shape)
+    condensed = lift.T @ carried
     _, centroid = mass_and_centroid(mesh, mass)
     return SuperElement(
         id=part_id,
-        ports=tuple(port.name for port in used),
+        ports=tuple(port.name for port in ports),
         points=points,
         stiffness=project_rigid((stiffness + stiffness.T) / 2.0, rigid_motions(points, centroid)),
         mass=(condensed + condensed.T) / 2.0,
