@@ -1,7 +1,8 @@
-"""Readings of hanging-weight tests: a tidy CSV file, one reading per row, units in the header.
+"""Readings of weights hung on rigs and of rigs tapped: a tidy CSV file, units in the header.
 
-Spreadsheets write CSV in many ways; commas or semicolons, decimal points or commas, blank cells or NA
-are all understood. What could be read in two ways is refused, with row and column.
+One reading per row: how far a point went down (``reading_mm``), or the natural frequency of the tapped
+rig (``frequency_hz``). Spreadsheets write CSV in many ways; commas or semicolons, decimal points or commas,
+blank cells or NA are all understood. What could be read in two ways is refused, with row and column.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import difflib
 import hashlib
 import io
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, sqrt
 from pathlib import Path
 from typing import Final
@@ -19,7 +20,7 @@ from typing import Final
 from calibration.errors import DataError
 from calibration.rigs import ANGLE_OFF, Condition, Rig
 
-__all__ = ["COLUMNS", "GRAVITY", "Dataset", "Reading", "parse_csv", "read_csv"]
+__all__ = ["COLUMNS", "GRAVITY", "PAIRS", "Dataset", "Reading", "parse_csv", "read_csv"]
 
 GRAVITY: Final = 9.80665
 """Standard acceleration of gravity (m/s2)."""
@@ -34,13 +35,18 @@ COLUMNS: Final = {
     "repeat": False,
     "span_mm": False,
     "load_g": True,
-    "reading_mm": True,
+    "reading_mm": False,
     "reading_unloaded_mm": False,
-    "resolution_mm": True,
+    "resolution_mm": False,
+    "frequency_hz": False,
+    "resolution_hz": False,
     "direction": False,
     "notes": False,
 }
-"""Columns of the file, and whether each must be there and filled."""
+"""Columns of the file, and whether each must be there and filled; either pair of `PAIRS` must be too."""
+
+PAIRS: Final = (("reading_mm", "resolution_mm"), ("frequency_hz", "resolution_hz"))
+"""What is read, and the finest step of it: of a sag, or of a tap test."""
 
 DIRECTIONS: Final = {"loading": 1, "unloading": -1}
 
@@ -64,14 +70,16 @@ class Reading:
     force : float
         Weight of what hangs there (N).
     displacement : float
-        How far the point went down (m).
+        How far the point went down (m); 0 in a tap test.
     own_weight : bool
         True when the displacement counts from the rig without any weight, so that the rig's own weight
         is in it; False when the unloaded reading was taken off.
     resolution : float
-        Smallest step of the ruler or gauge (m).
+        Smallest step of the ruler or gauge (m), of the frequency in a tap test (Hz).
     direction : int
         1 while loading, -1 while unloading, 0 when not said.
+    frequency : float
+        Natural frequency of the tapped rig (Hz); 0 when a displacement was read.
     """
 
     row: int
@@ -85,11 +93,23 @@ class Reading:
     own_weight: bool
     resolution: float
     direction: int
+    frequency: float = 0.0
+
+    @property
+    def tap(self) -> bool:
+        """Whether a frequency was read."""
+        return self.condition.tap
+
+    @property
+    def value(self) -> float:
+        """What was read: a displacement (m) or a frequency (Hz)."""
+        return self.frequency if self.tap else self.displacement
 
     @property
     def rounding(self) -> float:
-        """Standard deviation (m) from rounding to the ruler's steps: resolution / sqrt(12) per reading."""
-        return self.resolution * sqrt((1.0 if self.own_weight else 2.0) / 12.0)
+        """Standard deviation from rounding to the ruler's steps: resolution / sqrt(12) per reading."""
+        once = self.tap or self.own_weight
+        return self.resolution * sqrt((1.0 if once else 2.0) / 12.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,6 +212,12 @@ def _check_header(header: list[str], line: int) -> None:
         for name, needed in COLUMNS.items()
         if needed and name not in header
     ]
+    read = [pair for pair in PAIRS if pair[0] in header]
+    if not read:
+        faults.append(f"row {line}: there is neither a column 'reading_mm' nor 'frequency_hz'")
+    faults += [
+        f"row {line}: the column {step!r} is missing" for _, step in read if step not in header
+    ]
     if faults:
         raise DataError(faults)
 
@@ -274,10 +300,6 @@ class _Row:
         before = len(self.faults)
         condition = self.condition(rigs)
         load = self.number("load_g", 0.0)
-        loaded, unloaded = self.number("reading_mm"), self.number("reading_unloaded_mm")
-        resolution = self.number("resolution_mm", 0.0)
-        if resolution == 0.0:
-            self.fault("resolution_mm", "must be more than 0: it is the finest step you can read")
         if load is not None and load > _MOST_LOAD_G:
             self.fault("load_g", f"{load:g} g is more than any rig carries; is it in grams?")
         word = (self.text("direction") or "").lower()
@@ -286,29 +308,62 @@ class _Row:
         repeat = self.number("repeat", 0.0)
         if repeat is not None and repeat != int(repeat):
             self.fault("repeat", f"{repeat:g} is not a whole number")
-        if len(self.faults) > before or None in (condition, load, loaded, resolution):
+        tap = self.text("frequency_hz") is not None
+        value, unloaded, resolution = self.tapped() if tap else self.sagged()
+        if len(self.faults) > before or None in (condition, load, value, resolution):
             return None
         assert condition is not None  # said above; the type checker does not see it
         assert load is not None
-        assert loaded is not None
+        assert value is not None
         assert resolution is not None
-        down = loaded - (unloaded or 0.0)
-        if down < -5.0 * resolution:
+        if not tap and value < -5.0 * resolution:
             self.fault(
                 "reading_mm",
-                f"went up by {-down:g} mm under a load; millimetres must count downward",
+                f"went up by {-value:g} mm under a load; millimetres must count downward",
             )
             return None
         return Reading(
             row=self.line,
-            condition=condition,
+            condition=replace(condition, tap=True, mass=load * 1e-3) if tap else condition,
             joint_type=str(self.text("joint_type")),
             specimen=self.text("specimen") or "1",
             test=self.text("test_id") or "",
             repeat=int(repeat or 1),
             force=load * 1e-3 * GRAVITY,
-            displacement=down * 1e-3,
-            own_weight=unloaded is None,
-            resolution=resolution * 1e-3,
-            direction=DIRECTIONS.get(word, 0),
+            displacement=0.0 if tap else value * 1e-3,
+            own_weight=not tap and unloaded is None,
+            resolution=resolution if tap else resolution * 1e-3,
+            direction=0 if tap else DIRECTIONS.get(word, 0),
+            frequency=value if tap else 0.0,
         )
+
+    def sagged(self) -> tuple[float | None, float | None, float | None]:
+        """Return how far the point went down, the unloaded reading and the finest step (mm)."""
+        if self.text("reading_mm") is None:
+            self.fault("reading_mm", "is blank, and so is 'frequency_hz': nothing was read")
+            return None, None, None
+        loaded, unloaded = self.number("reading_mm"), self.number("reading_unloaded_mm")
+        down = None if loaded is None else loaded - (unloaded or 0.0)
+        return down, unloaded, self.step("resolution_mm")
+
+    def tapped(self) -> tuple[float | None, None, float | None]:
+        """Return the frequency and the finest step of it (Hz)."""
+        for name in ("reading_mm", "reading_unloaded_mm"):
+            if self.text(name) is not None:
+                self.fault(name, "stands beside 'frequency_hz': one reading per row")
+        frequency = self.number("frequency_hz", 0.0)
+        if frequency == 0.0:
+            self.fault(
+                "frequency_hz", "must be more than 0; leave it blank where nothing was tapped"
+            )
+        return frequency, None, self.step("resolution_hz")
+
+    def step(self, column: str) -> float | None:
+        """Return the finest step that can be read."""
+        if self.text(column) is None:
+            self.fault(column, "is blank")
+            return None
+        value = self.number(column, 0.0)
+        if value == 0.0:
+            self.fault(column, "must be more than 0: it is the finest step you can read")
+        return value

@@ -23,6 +23,8 @@ hundred files."""
 FAR: Final = 4.0
 """Studentised residuals beyond this are outliers: among 10,000 normal ones there is none or one."""
 
+_FINER: Final = "record for longer, or fix less weight"
+
 _POINTS = 15
 _ZOOMS = 7
 _ROWS_SHOWN = 10
@@ -65,7 +67,7 @@ def grid_check(
     data = design(readings)
     chosen = found.active[:2]
     kept = [data.offsets.index(offset) for offset in found.offsets]
-    moved = data.moved - data.columns[:, kept] @ found.offset_values
+    moved = data.read - data.columns[:, kept] @ found.offset_values
     weight = 1.0 / found.sigma**2
     count = len(data.conditions)
 
@@ -78,11 +80,13 @@ def grid_check(
         for a, b in ((data.force, data.force), (data.force, data.own), (data.own, data.own))
     )
     yf, yo, yy = total(moved * data.force), total(moved * data.own), float(weight @ moved**2)
+    yt, tt = total(moved * data.tapped), total(data.tapped.astype(float))
 
     def chi2(point: Array) -> float:
         a = forward(data.conditions, point)
-        c, o = a.per_newton, a.own_weight
-        return float(yy - 2 * (yf @ c + yo @ o) + ff @ c**2 + 2 * fo @ (c * o) + oo @ o**2)
+        c, o, f = a.per_newton, a.own_weight, a.frequency
+        sags = -2 * (yf @ c + yo @ o) + ff @ c**2 + 2 * fo @ (c * o) + oo @ o**2
+        return float(yy + sags - 2 * yt @ f + tt @ f**2)
 
     best = found.log_stiffness.copy()
     best[list(chosen)] = np.log(start)[list(chosen)]
@@ -135,12 +139,17 @@ def cure(
 def warnings(readings: Sequence[Reading], found: Fit) -> list[str]:
     """Return what a careful person would say about these data, one sentence each."""
     out = []
-    small = [r.row for r in readings if r.force > 0 and abs(r.displacement) < 3.0 * r.resolution]
-    if small:
-        out.append(
-            f"{_readings(len(small))} below three times the resolution ({_rows(small)}): "
-            "hang more weight or read more finely"
-        )
+    for tap, cure_words in ((False, "hang more weight or read more finely"), (True, _FINER)):
+        small = [
+            r.row
+            for r in readings
+            if r.tap is tap and (tap or r.force > 0) and abs(r.value) < 3.0 * r.resolution
+        ]
+        if small:
+            out.append(
+                f"{_readings(len(small))} below three times the resolution ({_rows(small)}): "
+                f"{cure_words}"
+            )
     for joint in sorted({r.joint_type for r in readings}):
         poses = sorted(
             {(r.condition.rig, r.condition.pose) for r in readings if r.joint_type == joint}
@@ -151,7 +160,7 @@ def warnings(readings: Sequence[Reading], found: Fit) -> list[str]:
         out.append(f"only {_readings(len(readings))}: the intervals are wide guesses")
     student = found.residuals / np.sqrt(np.clip(1.0 - found.leverage, 1e-3, None))
     far = [r.row for r, size in zip(readings, np.abs(student), strict=True) if size > FAR]
-    if far and found.scatter > 0.0:
+    if far and max(found.scatter, found.tap_scatter) > 0.0:
         out.append(
             f"{_readings(len(far))} far from the rest ({_rows(far)}): look for slips; "
             "--robust gives them less weight"

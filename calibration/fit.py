@@ -1,9 +1,9 @@
 """Joint stiffnesses from readings: weighted nonlinear least squares in the logarithms.
 
 The error of a reading has two parts: rounding to the ruler's steps, known from its resolution, and a
-scatter in proportion to the displacement (friction, seating, how the pin was pushed in), which is found
-from the readings themselves so that the weighted residuals have the variance they should have. The
-mechanics comes in as a callable; this module knows none.
+scatter in proportion to what is read (friction, seating, how the pin was pushed in), which is found from
+the readings themselves so that the weighted residuals have the variance they should have: one scatter for
+displacements, one for frequencies. The mechanics comes in as a callable; this module knows none.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from scipy import optimize, stats
 from calibration.dataset import Reading
 from calibration.errors import FitError
 from calibration.model import Array, Design, Forward, Offset, design, weighted_matrix
+from calibration.scatter import HUBER, TAP_SHARE, Loss, scatters
 
 __all__ = ["Fit", "Loss", "Switch", "fit"]
 
-Loss = Literal["linear", "huber"]
 Switch = Literal["auto", "off"]
 
 WIDEST: Final = 1.0
@@ -37,9 +37,6 @@ CONTRADICTION: Final = 0.5
 
 OFFSET_P: Final = 1e-3
 """An offset is kept when chance would show one as large this rarely: a needless one costs precision."""
-
-HUBER: Final = 1.345
-"""Huber's constant: 95 % of the efficiency of least squares when errors are normal."""
 
 _OUTER = 30
 
@@ -62,10 +59,11 @@ class Fit:
         Of the logarithms of the active stiffnesses, then of the offsets (m).
     quantile : float
         How many standard deviations reach to the ends of the 95 % interval.
-    scatter : float
-        Standard deviation in proportion to the displacement.
+    scatter, tap_scatter : float
+        Standard deviation in proportion to the displacement, and to the frequency in tap tests.
     sigma, predicted, residuals, leverage : (n,) ndarray
-        Standard deviation (m), prediction (m), weighted residual and leverage of each reading.
+        Standard deviation (m or Hz), prediction (m or Hz), weighted residual and leverage of each
+        reading.
     chi2 : float
     dof : int
     singular_values : (a,) ndarray
@@ -82,6 +80,7 @@ class Fit:
     covariance: Array
     quantile: float
     scatter: float
+    tap_scatter: float
     sigma: Array
     predicted: Array
     residuals: Array
@@ -138,7 +137,7 @@ def fit(
     state = _converge(data, forward, begin, every, loss)
     if every and state.active:
         size = len(state.active)
-        covariance, dof = _covariance(state), max(1, len(data.moved) - size - len(every))
+        covariance, dof = _covariance(state), max(1, len(data.read) - size - len(every))
         t = np.abs(state.shift) / np.sqrt(np.diag(covariance))[size:]
         limit = stats.t.ppf(1.0 - OFFSET_P / 2.0, dof)
         kept = tuple(k for k, value in zip(every, t, strict=True) if value > limit)
@@ -158,7 +157,7 @@ class _State:
     shift: Array
     offsets: tuple[int, ...]
     active: tuple[int, ...]
-    scatter: float
+    scatter: tuple[float, float]
     sigma: Array
     predicted: Array
     matrix: Array
@@ -173,26 +172,32 @@ def _converge(
     columns = data.columns[:, list(offsets)]
     log_s, shift = begin.copy(), np.zeros(len(offsets))
     value, slope = data.predict(forward, log_s)
-    scatter = 0.05  # to begin with; found from the residuals from the first round on
+    # to begin with; found from the residuals from the first round on
+    scatter = (0.05, 0.05 * TAP_SHARE)
+
+    def deviations(scatter: tuple[float, float], size: Array) -> Array:
+        return np.hypot(data.rounding, np.where(data.tapped, scatter[1], scatter[0]) * size)
+
     size = np.abs(value)
-    active = _identifiable(slope, columns, np.hypot(data.rounding, scatter * size))
+    active = _identifiable(slope, columns, deviations(scatter, size))
     for turn in range(_OUTER):
-        sigma = np.hypot(data.rounding, scatter * size)
+        sigma = deviations(scatter, size)
         log_s, shift = _minimise(data, forward, log_s, shift, active, columns, sigma, loss)
         value, slope = data.predict(forward, log_s)
         size, before = np.abs(value), scatter
-        misfit = data.moved - value - columns @ shift
-        scatter = _scatter(misfit, data.rounding, size, len(active) + len(shift), loss)
+        misfit = data.read - value - columns @ shift
+        matrix = weighted_matrix(slope[:, list(active)], columns, sigma)
+        scatter = scatters(data, misfit, size, matrix, loss)
         # at the start every stiffness is a guess: what shows is decided where the fit ends up
         # (readings that contradict each other are refused at the end, not called silent)
-        spread = min(scatter, CONTRADICTION)
-        found = _identifiable(slope, columns, np.hypot(data.rounding, spread * size))
+        spread = (min(scatter[0], CONTRADICTION), min(scatter[1], CONTRADICTION * TAP_SHARE))
+        found = _identifiable(slope, columns, deviations(spread, size))
         if found != active and turn < _OUTER // 2:
             active = found
             log_s = np.where(np.isin(np.arange(len(begin)), active), log_s, begin)
-        elif abs(scatter - before) <= 1e-9 * (scatter + 1e-9):
+        elif all(abs(x - y) <= 1e-9 * (x + 1e-9) for x, y in zip(scatter, before, strict=True)):
             break
-    sigma = np.hypot(data.rounding, scatter * size)
+    sigma = deviations(scatter, size)
     residuals = misfit / sigma
     weights = np.ones(len(residuals))
     if loss == "huber":
@@ -217,7 +222,7 @@ def _minimise(
     """Return the best active stiffnesses and offsets for given weights."""
     chosen, count = list(active), len(active)
     # offsets in the size of the errors, so that all unknowns are of one order
-    unit = float(np.median(sigma))
+    unit = float(np.median(sigma[~data.tapped])) if len(shift) else 1.0
 
     def unpack(z: Array) -> tuple[Array, Array]:
         out = log_s.copy()
@@ -226,7 +231,7 @@ def _minimise(
 
     def residuals(z: Array) -> Array:
         s, c = unpack(z)
-        return np.asarray((data.predict(forward, s)[0] + columns @ c - data.moved) / sigma)
+        return np.asarray((data.predict(forward, s)[0] + columns @ c - data.read) / sigma)
 
     def jacobian(z: Array) -> Array:
         slope = data.predict(forward, unpack(z)[0])[1][:, chosen]
@@ -250,27 +255,6 @@ def _minimise(
         max_nfev=200,
     )
     return unpack(answer.x)
-
-
-def _scatter(misfit: Array, rounding: Array, size: Array, used: int, loss: Loss) -> float:
-    """Return the proportional scatter that makes the weighted residuals as large as they should be."""
-    dof = len(misfit) - used
-    if dof <= 0:
-        return 0.0
-
-    def excess(b: float) -> float:
-        z = misfit / np.hypot(rounding, b * size)
-        if loss == "huber":
-            # the median does not see outliers; 0.6745 is that of a standard normal's size
-            return float(np.median(np.abs(z)) / 0.6745 * np.sqrt(len(z) / dof)) - 1.0
-        return float(z @ z) / dof - 1.0
-
-    if excess(0.0) <= 0.0:
-        return 0.0
-    high = 0.1
-    while excess(high) > 0.0 and high < 1e3:
-        high *= 4.0
-    return float(optimize.brentq(excess, 0.0, high, xtol=1e-14)) if high < 1e3 else high
 
 
 def _identifiable(slope: Array, columns: Array, sigma: Array) -> tuple[int, ...]:
@@ -297,12 +281,13 @@ def _covariance(state: _State) -> Array:
 
 
 def _refuse_contradiction(state: _State, readings: Sequence[Reading], begin: Array) -> None:
-    if state.scatter > CONTRADICTION:
+    scatter = max(state.scatter[0], state.scatter[1] / TAP_SHARE)
+    if scatter > CONTRADICTION:
         worst = np.argsort(-np.abs(state.residuals))[:5]
         rows = ", ".join(str(readings[k].row) for k in sorted(worst))
         raise FitError(
             "the readings contradict each other or the rig: beside the best fit they scatter by "
-            f"{100 * state.scatter:.0f} % of their size. Look at rows {rows} first, then at rig, pose, "
+            f"{100 * scatter:.0f} % of their size. Look at rows {rows} first, then at rig, pose, "
             "span and units"
         )
     edge = np.abs(state.log_stiffness - begin) > REACH - 1e-6
@@ -335,7 +320,8 @@ def _result(data: Design, state: _State, readings: Sequence[Reading]) -> Fit:
         offset_values=state.shift,
         covariance=covariance,
         quantile=quantile,
-        scatter=state.scatter,
+        scatter=state.scatter[0],
+        tap_scatter=state.scatter[1],
         sigma=state.sigma,
         predicted=state.predicted,
         residuals=state.residuals,

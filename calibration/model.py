@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Response:
-    """How rigs answer, one row per condition.
+    """How rigs answer, one row per condition; what a condition does not ask for is 0.
 
     Parameters
     ----------
@@ -28,12 +28,17 @@ class Response:
         How far it goes down by the rig's own weight (m).
     d_per_newton, d_own_weight : (c, k) ndarray
         Derivatives with respect to the logarithms of the k stiffnesses.
+    frequency : (c,) ndarray
+        Natural frequency of the tapped rig (Hz).
+    d_frequency : (c, k) ndarray
     """
 
     per_newton: Array
     own_weight: Array
     d_per_newton: Array
     d_own_weight: Array
+    frequency: Array
+    d_frequency: Array
 
 
 Forward = Callable[[Sequence[Condition], Array], Response]
@@ -67,9 +72,12 @@ class Design:
         Different ones only.
     which : (n,) ndarray of int
         Condition of each reading.
-    force, moved, own, rounding : (n,) ndarray
-        Force (N), displacement (m), 1.0 where the own weight counts, standard deviation (m) from
-        rounding.
+    force, own : (n,) ndarray
+        Force (N), and 1.0 where the own weight counts; both 0 in tap tests.
+    tapped : (n,) ndarray of bool
+        Where a frequency was read.
+    read, rounding : (n,) ndarray
+        Displacement (m) or frequency (Hz), and the standard deviation of it from rounding.
     offsets : tuple of Offset
         Those that the readings can tell.
     columns : (n, q) ndarray
@@ -79,21 +87,25 @@ class Design:
     conditions: tuple[Condition, ...]
     which: NDArray[np.int64]
     force: Array
-    moved: Array
     own: Array
+    tapped: NDArray[np.bool_]
+    read: Array
     rounding: Array
     offsets: tuple[Offset, ...]
     columns: Array
 
     def predict(self, forward: Forward, log_stiffness: Array) -> tuple[Array, Array]:
-        """Return the displacements, (n,), and their derivatives, (n, k), without offsets."""
+        """Return what should be read, (n,), and its derivatives, (n, k), without offsets."""
         answer = forward(self.conditions, log_stiffness)
         value = (
-            self.force * answer.per_newton[self.which] + self.own * answer.own_weight[self.which]
+            self.force * answer.per_newton[self.which]
+            + self.own * answer.own_weight[self.which]
+            + self.tapped * answer.frequency[self.which]
         )
         slope = (
             self.force[:, None] * answer.d_per_newton[self.which]
             + self.own[:, None] * answer.d_own_weight[self.which]
+            + self.tapped[:, None] * answer.d_frequency[self.which]
         )
         return value, slope
 
@@ -102,13 +114,14 @@ def design(readings: Sequence[Reading]) -> Design:
     """Return the readings as arrays."""
     conditions = tuple(sorted({r.condition for r in readings}))
     index = {condition: k for k, condition in enumerate(conditions)}
-    force = np.array([r.force for r in readings])
+    tapped = np.array([r.tap for r in readings], dtype=bool)
+    force = np.where(tapped, 0.0, [r.force for r in readings])
     offsets: list[Offset] = []
     columns: list[Array] = []
     place = np.array([f"{r.condition.rig}\0{r.condition.pose}" for r in readings])
     way = np.array([r.direction for r in readings], dtype=float)
-    for rig, pose in sorted({(c.rig, c.pose) for c in conditions}):
-        here = (place == f"{rig}\0{pose}").astype(float)
+    for rig, pose in sorted({(c.rig, c.pose) for c in conditions if not c.tap}):
+        here = ((place == f"{rig}\0{pose}") & ~tapped).astype(float)
         hung = force[(here > 0.0) & (force > 0.0)]
         # a dead zone shows only as a line through different loads that misses zero
         if len(np.unique(hung)) >= 3:
@@ -121,8 +134,9 @@ def design(readings: Sequence[Reading]) -> Design:
         conditions=conditions,
         which=np.array([index[r.condition] for r in readings], dtype=np.int64),
         force=force,
-        moved=np.array([r.displacement for r in readings]),
         own=np.array([float(r.own_weight) for r in readings]),
+        tapped=tapped,
+        read=np.array([r.value for r in readings]),
         rounding=np.array([r.rounding for r in readings]),
         offsets=tuple(offsets),
         columns=np.column_stack(columns) if columns else np.zeros((len(readings), 0)),

@@ -100,7 +100,7 @@ class Rig:
 
 @dataclass(frozen=True, slots=True, order=True)
 class Condition:
-    """What decides how a rig answers to a newton: equal conditions are computed once.
+    """What decides how a rig answers: equal conditions are computed once.
 
     Parameters
     ----------
@@ -108,12 +108,18 @@ class Condition:
     angle_deg : float
     place : str
         The loaded and measured hole.
+    tap : bool
+        Whether a natural frequency is measured instead of a displacement.
+    mass : float
+        What is fixed to the place while it is tapped (kg).
     """
 
     rig: str
     pose: str
     angle_deg: float
     place: str
+    tap: bool = False
+    mass: float = 0.0
 
 
 @cache

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from calibration.dataset import GRAVITY
 from technic.assembly.stiffness import SCHEMA as TABLE_SCHEMA
 from technic.assembly.stiffness import ConnectionStiffness
 from technic.report.style import Style
@@ -15,9 +16,19 @@ from technic.report.wording import count, number
 from technic.statics.calibration import Calibration, Measured
 from technic.units import MM
 
-__all__ = ["SCHEMA", "calibration_dict", "calibration_text", "calibration_toml"]
+__all__ = [
+    "SCHEMA",
+    "calibration_dict",
+    "calibration_text",
+    "calibration_toml",
+    "offset_words",
+    "scatter_words",
+]
 
 SCHEMA = "technic-calibration/1"
+
+_GROUPS_SHOWN = 20
+"""The rest is in the JSON report."""
 
 
 def _parameter(measured: Measured) -> dict[str, Any]:
@@ -53,6 +64,19 @@ def _offsets(result: Calibration) -> list[dict[str, Any]]:
     ]
 
 
+def _read(result: Calibration, k: int) -> dict[str, float | None]:
+    """Return what was read, what the fit says, and the standard deviation, of a sag or a tap."""
+    reading, fit = result.dataset.readings[k], result.fit
+    found = (reading.value, float(fit.predicted[k]), float(fit.sigma[k]))
+    names = ("measured", "predicted", "sigma")
+    sag, tap = (None, 1.0) if reading.tap else (1.0 / MM, None)
+    return {
+        f"{name}_{unit}": None if scale is None else scale * value
+        for unit, scale in (("mm", sag), ("hz", tap))
+        for name, value in zip(names, found, strict=True)
+    }
+
+
 def calibration_dict(result: Calibration) -> dict[str, Any]:
     """Return the calibration as plain values, ready for JSON."""
     from technic import __version__
@@ -69,6 +93,7 @@ def calibration_dict(result: Calibration) -> dict[str, Any]:
         "log_covariance": result.log_covariance.tolist(),
         "singular_values": fit.singular_values.tolist(),
         "scatter": fit.scatter,
+        "tap_scatter": fit.tap_scatter if any(r.tap for r in readings) else None,
         "chi2": fit.chi2,
         "degrees_of_freedom": fit.dof,
         "offsets": _offsets(result),
@@ -88,9 +113,8 @@ def calibration_dict(result: Calibration) -> dict[str, Any]:
                 "rig": reading.condition.rig,
                 "pose": reading.condition.pose,
                 "load_n": reading.force,
-                "measured_mm": reading.displacement / MM,
-                "predicted_mm": float(fit.predicted[k]) / MM,
-                "sigma_mm": float(fit.sigma[k]) / MM,
+                "kind": "tap" if reading.tap else "sag",
+                **_read(result, k),
                 "residual": float(fit.residuals[k]),
                 "leverage": float(fit.leverage[k]),
             }
@@ -174,6 +198,32 @@ def calibration_toml(result: Calibration, date: str) -> str:
     return "\n".join(lines) + "\n"
 
 
+def offset_words(result: Calibration) -> list[str]:
+    """Return free play and hysteresis that were found, one line each."""
+    out = []
+    for entry in _offsets(result):
+        word = "free play" if entry["kind"] == "free_play" else "hysteresis"
+        low, high = (number(x) for x in entry["interval_95"])
+        out.append(
+            f"{word} of {entry['rig']} in pose {entry['pose']}: {number(entry['value_mm'])} mm "
+            f"(95 % sure: {low} to {high})"
+        )
+    return out
+
+
+def scatter_words(result: Calibration) -> str:
+    """Return how far readings scatter, one sentence."""
+    fit, readings = result.fit, result.dataset.readings
+    said = []
+    if not all(r.tap for r in readings):
+        said.append(
+            f"Readings scatter by {100 * fit.scatter:.1f} % beside the rounding of the ruler."
+        )
+    if any(r.tap for r in readings):
+        said.append(f"Frequencies scatter by {100 * fit.tap_scatter:.1f} %.")
+    return " ".join(said)
+
+
 def calibration_text(result: Calibration, style: Style | None = None) -> str:
     """Return the calibration in plain words, with a final newline."""
     style = Style() if style is None else style
@@ -196,32 +246,37 @@ def calibration_text(result: Calibration, style: Style | None = None) -> str:
             f"   {m.parameter}: {style('number', number(m.value))} {m.unit} "
             f"(95 % sure: {low} to {high})"
         )
-    for entry in _offsets(result):
-        word = "free play" if entry["kind"] == "free_play" else "hysteresis"
-        low, high = (number(x) for x in entry["interval_95"])
-        lines.append(
-            f"   {word} of {entry['rig']} in pose {entry['pose']}: {number(entry['value_mm'])} mm "
-            f"(95 % sure: {low} to {high})"
-        )
+    lines += [f"   {said}" for said in offset_words(result)]
     lines += [
         "",
-        f"Readings scatter by {100 * fit.scatter:.1f} % beside the rounding of the ruler.",
+        scatter_words(result),
         f"Grid search: {'the same values' if result.grid.agrees else 'another point, see below'}.",
     ]
     lines += ["", style("bold", "How well it fits (mean of each pose and weight)")]
-    groups: dict[tuple[str, str, str, float], list[int]] = {}
+    groups: dict[tuple[bool, str, str, str, float], list[int]] = {}
     for k, r in enumerate(readings):
         place = r.condition.place
-        groups.setdefault((r.condition.rig, r.condition.pose, place, r.force), []).append(k)
-    for (rig, pose, place, force), members in sorted(groups.items())[:20]:
-        seen = float(np.mean([readings[k].displacement for k in members])) / MM
-        said = float(np.mean(fit.predicted[members])) / MM
+        groups.setdefault((r.tap, r.condition.rig, r.condition.pose, place, r.force), []).append(k)
+    for (tap, rig, pose, place, force), members in sorted(groups.items())[:_GROUPS_SHOWN]:
+        seen = float(np.mean([readings[k].value for k in members]))
+        said = float(np.mean(fit.predicted[members]))
+        if tap:
+            weight, values = (
+                f"{number(1e3 * force / GRAVITY)} g",
+                (f"{x:.1f} Hz" for x in (seen, said)),
+            )
+            where = f"tapped with {weight} on {place}"
+        else:
+            where, values = (
+                f"{number(force)} N at {place}",
+                (f"{x / MM:.2f} mm" for x in (seen, said)),
+            )
+        measured, fitted = values
         lines.append(
-            f"   {rig} {pose}, {number(force)} N at {place}: "
-            f"measured {seen:.2f} mm, fitted {said:.2f} mm ({len(members)} x)"
+            f"   {rig} {pose}, {where}: measured {measured}, fitted {fitted} ({len(members)} x)"
         )
-    if len(groups) > 20:
-        lines.append(f"   and {len(groups) - 20} more, see --json")
+    if len(groups) > _GROUPS_SHOWN:
+        lines.append(f"   and {len(groups) - _GROUPS_SHOWN} more, see --json")
     if result.warnings:
         lines += ["", style("warn", "Take care")]
         for warning in result.warnings:

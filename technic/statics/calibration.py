@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass, replace
-from importlib.resources import as_file
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from calibration.dataset import GRAVITY, Dataset, read_csv
+from calibration.dataset import Dataset, read_csv
 from calibration.diagnose import GridCheck, cure, grid_check, warnings
 from calibration.errors import DataError, FitError
 from calibration.fit import Fit, Loss, Switch, fit
-from calibration.model import Forward, Response
+from calibration.model import Forward
 from calibration.rigs import Condition, Rig, read_rigs, shipped_rigs
-from technic.assembly.model import Assembly
-from technic.assembly.select import parse_fix
 from technic.assembly.stiffness import StiffnessTable, default_table
 from technic.errors import InputError, SchemaError
 from technic.geometry import Array
-from technic.loading import load
-from technic.statics.loads import parse_probe
-from technic.statics.rig import RigModel, rig_model
-from technic.system.assemble import ElementFactory, element_of
+from technic.statics.forward import forward_model
+from technic.system.assemble import ElementFactory, solid_element_of
 from technic.system.parameters import Parameter
 
 __all__ = ["Calibration", "Measured", "calibrate", "forward_model"]
@@ -113,8 +107,8 @@ def calibrate(
     table: StiffnessTable | None = None,
     loss: Loss = "linear",
     offsets: Switch = "auto",
-    element: ElementFactory = element_of,
-    parts: str = "frame",
+    element: ElementFactory = solid_element_of,
+    parts: str = "solid",
 ) -> Calibration:
     """Return the joint stiffnesses that a file of readings tells.
 
@@ -217,78 +211,3 @@ def _measured(
             advice += f"Measure also pose {best[0].pose} of rig {best[0].rig}."
         out.append(Measured(parameter, value, None, identifiable=False, advice=advice))
     return tuple(out)
-
-
-def forward_model(
-    rigs: Mapping[str, Rig],
-    places: Iterable[tuple[str, str]],
-    parameters: Sequence[Parameter],
-    table: StiffnessTable,
-    element: ElementFactory = element_of,
-) -> Forward:
-    """Return the mechanics as the fit wants it; every rig is solved once for each loaded hole.
-
-    Parameters
-    ----------
-    rigs : mapping of str to Rig
-    places : iterable of (str, str)
-        Rig and loaded hole.
-    parameters : sequence of Parameter
-        Those that a rig does not have are zero in its derivatives.
-    table : StiffnessTable
-    element : callable
-    """
-    models: dict[tuple[str, str], tuple[RigModel, list[int]]] = {}
-    assemblies: dict[str, Assembly] = {}
-    for name, place in sorted(set(places)):
-        rig = rigs[name]
-        if name not in assemblies:
-            with ExitStack() as stack:
-                path = stack.enter_context(as_file(rig.model))
-                assembly = load(path, table=table)
-            supports = tuple(parse_fix(assembly, text) for text in rig.clamped)
-            assemblies[name] = replace(assembly, supports=assembly.supports + supports)
-        own = [k for k, p in enumerate(parameters) if p.motion in rig.joints.get(p.connection, ())]
-        model = rig_model(
-            assemblies[name],
-            parse_probe(assemblies[name], place),
-            [parameters[k] for k in own],
-            table,
-            element=element,
-        )
-        models[name, place] = (model, own)
-
-    known: dict[tuple[Condition, ...], tuple[Array, list[tuple[RigModel, list[int], Array]]]] = {}
-
-    def grouped(
-        conditions: tuple[Condition, ...],
-    ) -> tuple[Array, list[tuple[RigModel, list[int], Array]]]:
-        """Return down for every condition, and the conditions of each model."""
-        if conditions not in known:
-            down = np.array([rigs[c.rig].poses[c.pose].down_at(c.angle_deg) for c in conditions])
-            groups = [
-                (
-                    *models[key],
-                    np.array([k for k, c in enumerate(conditions) if (c.rig, c.place) == key]),
-                )
-                for key in sorted({(c.rig, c.place) for c in conditions})
-            ]
-            known[conditions] = (down, groups)
-        return known[conditions]
-
-    def forward(conditions: Sequence[Condition], log_stiffness: Array) -> Response:
-        down, groups = grouped(tuple(conditions))
-        stiffness = np.exp(np.asarray(log_stiffness, dtype=float))
-        c, k = len(down), len(parameters)
-        value, slope = np.zeros((2, c)), np.zeros((2, c, k))
-        for model, own, members in groups:
-            answer, change = model.response(stiffness[own])
-            d = down[members]
-            for half, scale in ((0, 1.0), (1, GRAVITY)):
-                columns = slice(3 * half, 3 * half + 3)
-                value[half, members] = scale * np.einsum("ci,ij,cj->c", d, answer[:, columns], d)
-                sloped = np.einsum("ci,pij,cj->cp", d, change[:, :, columns], d)
-                slope[half][np.ix_(members, np.array(own))] = scale * sloped
-        return Response(value[0], value[1], slope[0], slope[1])
-
-    return forward

@@ -15,17 +15,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, sparse
+from scipy import linalg
 
 from technic.assembly.model import Assembly
 from technic.assembly.stiffness import StiffnessTable
 from technic.errors import UsageError
 from technic.geometry import Array
 from technic.statics.solve import free_motions, refuse_driven
-from technic.system.assemble import ElementFactory, Probe, System, assemble, element_of
+from technic.system.assemble import ElementFactory, Probe, System, assemble, solid_element_of
 from technic.system.parameters import Parameter, parameter_rows
 
-__all__ = ["RigModel", "rig_model"]
+__all__ = ["RigModel", "RigSystem", "rig_model", "rig_system"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +81,7 @@ def rig_model(
     parameters: Sequence[Parameter],
     table: StiffnessTable,
     *,
-    element: ElementFactory = element_of,
+    element: ElementFactory = solid_element_of,
 ) -> RigModel:
     """Return the model of a rig.
 
@@ -95,6 +95,65 @@ def rig_model(
     table : StiffnessTable
     element : callable
         What parts are made of.
+
+    Raises
+    ------
+    UsageError
+        The rig has no joint of some parameter, or the load drives a motion that nothing resists.
+    """
+    rig = rig_system(assembly, probe, parameters, table, element)
+    x = _solved(rig, np.column_stack([rig.loads, rig.rows.T]))
+    return RigModel(
+        parameters=tuple(parameters),
+        start=rig.start,
+        owner=rig.owner,
+        base=rig.point @ x[:, :6],
+        rows=rig.rows @ x[:, 6:],
+        loaded=rig.rows @ x[:, :6],
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RigSystem:
+    """The matrices of a rig, n unknowns.
+
+    Parameters
+    ----------
+    system : System
+    start : (k,) ndarray
+        Stiffness of each parameter in the table (N/m, N m/rad).
+    rows : (r, n) ndarray
+        Joint motions whose stiffness is a parameter.
+    owner : (r,) ndarray of int
+        Parameter of each of these rows.
+    point : (3, n) ndarray
+        Motion of the loaded and measured place.
+    loads : (n, 6) ndarray
+        Unit forces on the place and unit gravity, along each axis.
+    motions : (n, m) ndarray
+        Motions that nothing resists; no load drives them.
+    free : (n, f) ndarray
+        Basis of what obeys the clamps.
+    """
+
+    system: System
+    start: Array
+    rows: Array
+    owner: NDArray[np.int64]
+    point: Array
+    loads: Array
+    motions: Array
+    free: Array
+
+
+def rig_system(
+    assembly: Assembly,
+    probe: Probe,
+    parameters: Sequence[Parameter],
+    table: StiffnessTable,
+    element: ElementFactory = solid_element_of,
+) -> RigSystem:
+    """Return the matrices of a rig; see `rig_model`.
 
     Raises
     ------
@@ -121,24 +180,24 @@ def rig_model(
     motions = free_motions(system)
     for load in loads.T:
         refuse_driven(motions, load)
-    a = system.A[rows].toarray()
-    x = _solved(system, motions, np.column_stack([loads, a.T]))
-    return RigModel(
-        parameters=tuple(parameters),
+    held = system.A[~system.elastic].toarray()
+    return RigSystem(
+        system=system,
         start=start,
+        rows=system.A[rows].toarray(),
         owner=owner,
-        base=point @ x[:, :6],
-        rows=a @ x[:, 6:],
-        loaded=a @ x[:, :6],
+        point=point,
+        loads=loads,
+        motions=motions.toarray(),
+        free=linalg.null_space(held) if len(held) else np.eye(system.size),
     )
 
 
-def _solved(system: System, motions: sparse.csc_array, loads: Array) -> Array:
+def _solved(rig: RigSystem, loads: Array) -> Array:
     """Return ``K^-1 loads`` on what obeys the supports, the free motions standing still."""
-    held = system.A[~system.elastic].toarray()
-    free = linalg.null_space(held) if len(held) else np.eye(system.size)
-    stiffness = free.T @ (system.K + system.J) @ free
-    idle = free.T @ motions.toarray()
+    free = rig.free
+    stiffness = free.T @ (rig.system.K + rig.system.J) @ free
+    idle = free.T @ rig.motions
     if idle.shape[1]:
         # what nothing resists and nothing drives may have any stiffness: it does not move
         idle = linalg.orth(idle)

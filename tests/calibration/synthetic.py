@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from calibration.dataset import GRAVITY
+from calibration.dataset import COLUMNS, GRAVITY
 from calibration.rigs import Condition, shipped_rigs
 from technic.assembly.stiffness import default_table
 from technic.statics.calibration import forward_model
@@ -16,10 +16,7 @@ SHEAR, TILT = 65625.0, 0.240
 """The values of Liu et al. 2022, in our units."""
 
 PIN = (Parameter("pin/pin_hole", "shear"), Parameter("pin/pin_hole", "tilt"))
-HEADER = (
-    "test_id,joint_type,rig,pose,pose_angle_deg,specimen,repeat,span_mm,load_g,reading_mm,"
-    "reading_unloaded_mm,resolution_mm,direction,notes"
-)
+HEADER = ",".join(COLUMNS)
 PAIR = (("pin-pair", "edge", 32, (20, 50)), ("pin-pair", "flat", 32, (20, 50)))
 BOTH = (*PAIR, ("pin-sandwich", "edge", 32, (100, 250)))
 
@@ -72,7 +69,7 @@ def rows(
                             read = [round(x / resolution) * resolution for x in read]
                         out.append(
                             f"t,pin/pin_hole,{rig},{pose},,{specimen},{repeat},{span},{load},"
-                            f"{read[0]!r},{read[1]!r},{resolution},{way},synthetic"
+                            f"{read[0]!r},{read[1]!r},{resolution},,,{way},synthetic"
                         )
     return [row.replace("np.float64(", "").replace(")", "") for row in out]
 

@@ -13,7 +13,7 @@ from calibration.errors import DataError
 from calibration.rigs import read_rigs, shipped_rigs
 from tests.calibration.synthetic import HEADER
 
-ROW = "t1,pin/pin_hole,pin-pair,edge,90,1,1,32,50,12.7,10.0,0.1,loading,fine"
+ROW = "t1,pin/pin_hole,pin-pair,edge,90,1,1,32,50,12.7,10.0,0.1,,,loading,fine"
 
 
 def parse(*rows, header=HEADER):
@@ -44,7 +44,7 @@ def test_a_row_in_si_units():
 
 
 def test_blank_cells_have_defaults():
-    (reading,) = parse(",pin/pin_hole,pin-pair,edge,NA,,,n/a,50,2.7,,0.1,,").readings
+    (reading,) = parse(",pin/pin_hole,pin-pair,edge,NA,,,n/a,50,2.7,,0.1,,,,").readings
     assert reading.own_weight
     assert reading.rounding == pytest.approx(1e-4 / 12**0.5)
     assert (reading.specimen, reading.repeat, reading.direction) == ("1", 1, 0)
@@ -108,6 +108,42 @@ def test_a_bad_cell_is_named_by_row_and_column(column, value, said):
     assert said in fault
 
 
+TAP = "t1,pin/pin_hole,pin-pair,edge,,1,1,,50,,,,8.9,0.1,,phone"
+
+
+def test_a_tap_test():
+    (reading,) = parse(TAP).readings
+    assert reading.tap
+    assert (reading.value, reading.resolution) == (8.9, 0.1)
+    assert reading.condition.mass == pytest.approx(0.050)
+    mixed = parse(ROW, TAP).readings
+    assert [r.tap for r in mixed] == [False, True]
+    assert mixed[0].condition.place == mixed[1].condition.place
+
+
+def test_a_file_of_taps_needs_no_ruler():
+    header = "joint_type;rig;pose;load_g;frequency_hz;resolution_hz"
+    (reading,) = parse("pin/pin_hole;pin-pair;flat;20;16,4;0,1", header=header).readings
+    assert (reading.frequency, reading.condition.pose) == (16.4, "flat")
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "said"),
+    [
+        (TAP.replace("8.9", ""), "reading_mm", "nothing was read"),
+        (TAP.replace("8.9", "0"), "frequency_hz", "more than 0"),
+        (TAP.replace("8.9", "-3"), "frequency_hz", "negative"),
+        (TAP.replace("8.9", "9 Hz"), "frequency_hz", "unit stands in the header"),
+        (TAP.replace(",0.1,", ",,"), "resolution_hz", "blank"),
+        (TAP.replace(",,,,8.9", ",12.7,,,8.9"), "reading_mm", "one reading per row"),
+    ],
+)
+def test_a_bad_tap_is_named_by_row_and_column(row, column, said):
+    (fault,) = faults(ROW, row)
+    assert fault.startswith(f"row 3, column {column!r}")
+    assert said in fault
+
+
 def test_every_fault_is_told_at_once():
     found = faults(with_cell("load_g", "-1"), ROW, with_cell("pose", "x"))
     assert [f.split(",")[0] for f in found] == ["row 2", "row 4"]
@@ -124,11 +160,18 @@ def test_every_fault_is_told_at_once():
         ("reading_mm", "reading_inch", "did you mean 'reading_mm'"),
         ("notes", "load_g", "2 times"),
         ("resolution_mm,", "", "'resolution_mm' is missing"),
+        ("resolution_hz,", "", "'resolution_hz' is missing"),
     ],
 )
 def test_a_bad_header(old, new, said):
     found = faults(ROW, header=HEADER.replace(old, new, 1))
     assert any(said in fault for fault in found)
+
+
+def test_a_header_without_readings():
+    header = "joint_type,rig,pose,load_g,resolution_mm"
+    (fault,) = faults("pin/pin_hole,pin-pair,edge,50,0.1", header=header)
+    assert "neither a column 'reading_mm' nor 'frequency_hz'" in fault
 
 
 def test_commas_that_split_a_number_are_noticed():
