@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from technic.commands.options import JsonOption, QuietOption
+from technic.commands.options import JsonOption, PictureOption, QuietOption
 
 if TYPE_CHECKING:
-    from technic.design.optimize.solve import Step
+    from technic.design.optimize.solve import Optimization, Step
 
 __all__ = ["optimize"]
 
@@ -38,6 +40,11 @@ def optimize(
         Path | None,
         typer.Option("--svg", metavar="SVG", help="Draw before and after, with the path between."),
     ] = None,
+    gif: Annotated[
+        Path | None,
+        typer.Option("--gif", metavar="GIF", help="Write the path of the joints as a film."),
+    ] = None,
+    picture: PictureOption = None,
     cut: Annotated[
         Path | None,
         typer.Option(
@@ -74,6 +81,9 @@ def optimize(
     restarts: Annotated[
         int, typer.Option("--restarts", min=0, help="Further searches from nearby geometries.")
     ] = 0,
+    max_evaluations: Annotated[
+        int, typer.Option("--max-evaluations", min=1, metavar="N", help="Geometries tried at most.")
+    ] = 500,
     max_seconds: Annotated[
         float, typer.Option("--max-seconds", min=0.0, metavar="S", help="Time allowed.")
     ] = float("inf"),
@@ -91,7 +101,14 @@ def optimize(
     from technic.report.optimize_text import optimization_dict, optimization_text
     from technic.report.style import style_for
 
-    for target in (out, svg, cut, None if json in (None, STDOUT) else Path(str(json))):
+    for target in (
+        out,
+        svg,
+        gif,
+        picture,
+        cut,
+        None if json in (None, STDOUT) else Path(str(json)),
+    ):
         if target is not None:
             check_writable(target)
     model = load(assembly)
@@ -100,27 +117,33 @@ def optimize(
     if list_vertices:
         typer.echo(vertex_list(find_geometry(model, names), model.dimension))
         return
-    progress = None if quiet or not sys.stderr.isatty() else _show
-    found = solve(
-        model,
-        rules=rules,
-        names=names,
-        geometry_weight=geometry_weight,
-        lengths=(shortest, longest),
-        clearance=None if clearance is None else 1e-3 * clearance,
-        max_mass=None if max_mass is None else 1e-3 * max_mass,
-        restarts=restarts,
-        max_seconds=max_seconds,
-        progress=progress,
-    )
-    if progress is not None:
-        sys.stderr.write("\r\033[K")
+    with _bar(max_evaluations, shown=not quiet and sys.stderr.isatty()) as progress:
+        found = solve(
+            model,
+            rules=rules,
+            names=names,
+            geometry_weight=geometry_weight,
+            lengths=(shortest, longest),
+            clearance=None if clearance is None else 1e-3 * clearance,
+            max_mass=None if max_mass is None else 1e-3 * max_mass,
+            restarts=restarts,
+            max_evaluations=max_evaluations,
+            max_seconds=max_seconds,
+            progress=progress,
+        )
     if out is not None:
         write_atomic(out, lambda path: save(found.after, path))
     if svg is not None:
         from technic.report.linkage_svg import comparison_svg
 
         _write(svg, comparison_svg(found))
+    if gif is not None:
+        from technic.report.files import write_bytes
+        from technic.report.linkage_gif import path_gif
+
+        write_bytes(gif, path_gif(found))
+    if picture is not None:
+        _draw(found, picture)
     if cut is not None or stl is not None:
         from technic.report.cutting import write_cut, write_stl
 
@@ -158,8 +181,32 @@ def _write(path: Path, text: str) -> None:
     write_bytes(path, text.encode())
 
 
-def _show(step: Step) -> None:
-    """Show the rigidity so far on one line of the terminal."""
-    said = f"evaluation {step.evaluation}: {step.rigidity:.4g} N/m"
-    sys.stderr.write(f"\r\033[K{said}")
-    sys.stderr.flush()
+def _draw(found: Optimization, picture: Path) -> None:
+    """Draw the linkage before and after under its worst loads, with one camera and one scale."""
+    from technic.report.comparison import comparison_scene
+    from technic.report.render import Painter
+    from technic.rigidity.analyze import analyze
+
+    with closing(Painter()) as painter:
+        reports = [analyze(found.before), analyze(found.after)]
+        painter.draw(comparison_scene(reports, ("before", "after")), picture)
+
+
+@contextmanager
+def _bar(most: int, *, shown: bool) -> Iterator[Callable[[Step], None] | None]:
+    """Show a progress bar with the rigidity so far; yields what it is told the progress with."""
+    if not shown:
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("search", total=most)
+
+        def tell(step: Step) -> None:
+            said = f"evaluation {step.evaluation}: {step.rigidity:.4g} N/m"
+            bar.update(task, completed=step.evaluation, description=said)
+
+        yield tell

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from xml.sax.saxutils import escape
 
 import numpy as np
@@ -10,14 +11,53 @@ from technic.design.optimize.solve import Optimization
 from technic.geometry import Array
 from technic.report.wording import number
 
-__all__ = ["comparison_svg"]
+__all__ = ["AFTER", "BEFORE", "INK", "PATH", "Sheet", "comparison_svg", "sheet_of"]
 
 WIDTH = 900.0
-"""Of the picture (px)."""
+"""Of the picture, or its height where the linkage is tall (px)."""
+
+NARROWEST = 560.0
+"""Width that the words below need (px)."""
 
 MARGIN = 40.0
 
 BEFORE, AFTER, PATH, INK = "#9aa5b1", "#0b6e99", "#c2571a", "#1f2933"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sheet:
+    """The vertices' path on a sheet: one scale and one frame for all steps.
+
+    Parameters
+    ----------
+    places : (s, v, 2) ndarray
+        Pixels, the second coordinate downward; one row per step of the history.
+    width, height : float
+        px.
+    thick : float
+        Width of a bar's line (px).
+    """
+
+    places: Array
+    width: float
+    height: float
+    thick: float
+
+
+def sheet_of(found: Optimization) -> Sheet:
+    """Return the path of the vertices on a sheet."""
+    steps = np.array([step.positions for step in found.history])
+    flat = steps @ _eye(found.geometry.positions, found.before.dimension).T
+    low, high = flat.reshape(-1, 2).min(axis=0), flat.reshape(-1, 2).max(axis=0)
+    scale = (WIDTH - 2 * MARGIN) / max(float((high - low).max()), 1e-12)
+    across, height = scale * (high - low)
+    width = max(NARROWEST, across + 2 * MARGIN)
+    height += 2 * MARGIN + 30.0
+    x = (width - across) / 2.0 + scale * (flat[..., 0] - low[0])
+    y = MARGIN + scale * (high[1] - flat[..., 1])
+    return Sheet(
+        np.stack([x, y], axis=-1), float(width), float(height), max(2.0, 0.6 * scale * 0.003)
+    )
 
 
 def comparison_svg(found: Optimization) -> str:
@@ -25,27 +65,15 @@ def comparison_svg(found: Optimization) -> str:
 
     Linkages in space are seen along the direction in which they are thinnest.
     """
-    steps = np.array([step.positions for step in found.history])
-    eye = _eye(found.geometry.positions, found.before.dimension)
-    flat = steps @ eye.T
-    low, high = flat.reshape(-1, 2).min(axis=0), flat.reshape(-1, 2).max(axis=0)
-    scale = (WIDTH - 2 * MARGIN) / max(float((high - low).max()), 1e-12)
-    height = 2 * MARGIN + 30.0 + scale * float(high[1] - low[1])
-
-    def at(points: Array) -> Array:
-        x = MARGIN + scale * (points[..., 0] - low[0])
-        y = MARGIN + scale * (high[1] - points[..., 1])
-        return np.stack([x, y], axis=-1)
-
-    places = at(flat)
-    thick = max(2.0, 0.6 * scale * 0.003)
+    sheet = sheet_of(found)
+    places, width, height, thick = sheet.places, sheet.width, sheet.height, sheet.thick
     out = [
         (
-            f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH:.0f}" height="{height:.0f}" '
-            f'viewBox="0 0 {WIDTH:.0f} {height:.0f}" font-family="sans-serif" font-size="14">'
+            f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
+            f'viewBox="0 0 {width:.0f} {height:.0f}" font-family="sans-serif" font-size="14">'
         ),
         f"<title>{escape(found.before.name)}: before and after</title>",
-        f'<rect width="{WIDTH:.0f}" height="{height:.0f}" fill="white"/>',
+        f'<rect width="{width:.0f}" height="{height:.0f}" fill="white"/>',
     ]
     for which, color, dash in (
         (0, BEFORE, ' stroke-dasharray="12 8" stroke-opacity="0.8"'),

@@ -27,8 +27,8 @@ from technic.system.inverse import single_thread
 
 __all__ = ["Optimization", "Step", "optimize"]
 
-SHARPNESS: Final = (15.0, 60.0, 250.0)
-"""Of the smooth minimum, per stage: the last one is within 0.3 % of the minimum where two modes meet."""
+SHARPNESS: Final = 30.0
+"""Of the smooth minimum in the first search: within 2.5 % of the minimum where two modes meet."""
 
 REACH: Final = 0.15
 """First limit of a move, in mean bar lengths."""
@@ -37,7 +37,7 @@ SMALL: Final = 5e-4
 """The search ends when moves are limited to this share of the mean bar length..."""
 
 GAIN: Final = 5e-3
-"""...or a round gains less than this share of the objective, at every sharpness."""
+"""...or a round gains less than this share of the objective."""
 
 POLISH: Final = (250.0, 1000.0)
 """Sharpness of the last searches, which run long enough for SLSQP to learn the curvature."""
@@ -48,7 +48,7 @@ CLOSE: Final = 0.1
 ROUNDS: Final = 6
 """...their number at most..."""
 
-FINE: Final = 1e-4
+FINE: Final = 1e-3
 """...and the gain (share of the objective) below which they end."""
 
 BROKEN: Final = 1e-6
@@ -216,33 +216,31 @@ class _Search:
     def run(self, start: Array) -> None:
         """Search from one start."""
         unit = self.limits.unit
-        for stage, sharpness in enumerate(SHARPNESS):
-            self.objective.sharpness = sharpness
-            q = start if stage == 0 or not len(self.best_q) else self.best_q
-            reach = REACH * unit / (1.0 + stage)
-            poor = 0
-            while reach > SMALL * unit:
-                before = self.objective.merit(self.point(q))
-                end = self.round(q, reach, 8)
-                merit = self.objective.merit(self.point(end))
-                kept = self.limits.broken(self.freedom.positions(end)) <= BROKEN
-                if kept and merit < before:
-                    touched = float(np.abs(end - q).max()) > 0.9 * reach
-                    poor = poor + 1 if before - merit < GAIN * max(1.0, abs(before)) else 0
-                    q = end
-                    reach *= 1.6 if touched and not poor else 0.5
-                else:
-                    poor, reach = poor + 1, 0.3 * reach
-                if poor > 0:
-                    break
+        self.objective.sharpness = SHARPNESS
+        q, reach = start, REACH * unit
+        while reach > SMALL * unit:
+            end, gain = self.gained(q, reach, 8)
+            if gain > 0.0:
+                touched = float(np.abs(end - q).max()) > 0.9 * reach
+                q = end
+                reach *= 1.6 if touched else 0.5
+            if gain < GAIN * max(1.0, abs(self.best)):
+                break
         for sharpness in POLISH:
             self.objective.sharpness = sharpness
             for _ in range(ROUNDS):
-                best = self.best
-                end = self.round(self.best_q, CLOSE * unit, 60)
-                self.point(end)
-                if best - self.best < FINE * max(1.0, abs(best)):
+                end, gain = self.gained(q, CLOSE * unit, 60)
+                q = end if gain > 0.0 else q
+                if gain < FINE * max(1.0, abs(self.best)):
                     break
+
+    def gained(self, q: Array, reach: float, iterations: int) -> tuple[Array, float]:
+        """Run a round from `q`; return its end and what the objective gained, 0 if limits are broken."""
+        before = self.objective.merit(self.point(q))
+        end = self.round(q, reach, iterations)
+        gain = before - self.objective.merit(self.point(end))
+        kept = self.limits.broken(self.freedom.positions(end)) <= BROKEN
+        return end, gain if kept else 0.0
 
 
 def optimize(

@@ -6,12 +6,14 @@ import json
 import re
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image, ImageSequence
 
 from technic.errors import UsageError
 from technic.loading import load
@@ -47,6 +49,28 @@ def test_command_writes_everything_that_was_asked_for(tmp_path: Path) -> None:
     assert len(picture.findall(f"{SVG}circle")) == 6
     assert cut.read_text().count("POLYLINE") == 5
     assert len(list((tmp_path / "stl").glob("*.stl"))) == 5
+
+
+def test_film_and_picture(tmp_path: Path) -> None:
+    """The film starts at the start, ends at the end and has the path between; the picture shows both."""
+    gif, png = tmp_path / "path.gif", tmp_path / "both.png"
+    done = run(MAST, "--gif", gif, "--picture", png, "--max-evaluations", "12", "-q")
+    assert done.returncode == 0, done.stderr
+    with Image.open(gif) as film:
+        assert 3 <= film.n_frames <= 13
+        frames = [
+            np.array(frame.convert("RGB")).astype(int) for frame in ImageSequence.Iterator(film)
+        ]
+        assert film.info["loop"] == 0
+    changed = [np.abs(b - a).max(axis=2) > 100 for a, b in pairwise(frames)]
+    assert any(c.sum() > 200 for c in changed)
+    assert np.abs(frames[-1] - frames[0]).max(axis=2).sum() > changed[0].sum()
+    # the path is drawn in its own colour, and only after the start
+    orange = [((f[..., 0] > 150) & (f[..., 1] < 120) & (f[..., 2] < 90)).sum() for f in frames]
+    assert orange[0] == 0
+    assert orange[-1] > 20
+    with Image.open(png) as both:
+        assert both.size[0] > 1.5 * both.size[1]
 
 
 def test_list_and_mistakes() -> None:
