@@ -13,6 +13,7 @@ from scipy import sparse
 
 from technic.assembly.model import Assembly, FindingKind
 from technic.assembly.stiffness import StiffnessTable
+from technic.errors import UsageError
 from technic.geometry import Array
 from technic.rigidity.eigen import elastic_modes
 from technic.rigidity.exact import lattice_rows, modular_rank
@@ -39,6 +40,7 @@ from technic.system.assemble import System, assemble
 from technic.system.inverse import single_thread
 from technic.system.library_models import library_models
 from technic.system.part_models import FACTORIES, PartModel, models_of, plain_parts
+from technic.system.port_walls import PortWalls, rigid_walls
 from technic.tolerances import MAIN_COMPONENT_SHARE, MOBILITY_GAP
 
 __all__ = ["FACTORIES", "Measure", "PartModel", "analyze"]
@@ -62,6 +64,7 @@ def analyze(
     measure: Measure = "mean_square",
     modes: int = 6,
     parts: PartModel = "solid",
+    port_walls: PortWalls = "mean",
     table: StiffnessTable | None = None,
 ) -> RigidityReport:
     """Tell how rigid an assembly is.
@@ -77,6 +80,9 @@ def analyze(
     parts : {"solid", "frame", "rigid"}
         What parts are made of: condensed solid models where they are shipped (elsewhere frame
         members, or rigid bodies where a part has none), frame members, or rigid bodies.
+    port_walls : {"mean", "rigid"}
+        "rigid": also find the rigidity with bores that keep their shape, the upper bound. Their
+        matrices are built when first needed (seconds for each kind of part) and kept in the cache.
     table : StiffnessTable, optional
         Where the joints' stiffnesses came from; when some of them were measured, the rigidity gets a
         95 % interval.
@@ -87,9 +93,13 @@ def analyze(
 
     Raises
     ------
+    UsageError
+        Rigid walls are asked for parts that are not solid models.
     NumericalError
         The eigenvalue step failed.
     """
+    if port_walls == "rigid" and parts != "solid":
+        raise UsageError("rigid port walls are for solid models of parts (parts: solid)")
     timings: dict[str, float] = {}
     # small decompositions by the hundred: a second thread makes them seven times slower
     with _timed(timings, "mobility"), single_thread():
@@ -104,6 +114,12 @@ def analyze(
         ]
     if found:
         found[0] = (_with_interval(system, *found[0], table), found[0][1])
+    if found and port_walls == "rigid":
+        with _timed(timings, "rigid_walls"):
+            stiffer = assemble(assembly, element=rigid_walls(assembly))
+            upper, _ = _elastic(stiffer, kin, bodies[0].motions, measure, 1, shown=True)
+        if found[0][0] is not None and upper is not None:
+            found[0] = (replace(found[0][0], rigid_walls=upper.value), found[0][1])
     with _timed(timings, "weak_spots"):
         main_modes = found[0][1] if found else ()
         first = main_modes[0].unknowns if main_modes else None

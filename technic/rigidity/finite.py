@@ -17,12 +17,19 @@ from scipy.sparse import linalg as sparse_linalg
 from technic.assembly.joint_types import JointType
 from technic.assembly.model import Assembly
 from technic.geometry import Array, Pose, rotation_matrix, rotation_vector, skew
-from technic.rigidity.kinematics import Kinematics
+from technic.rigidity.kinematics import Kinematics, merge_fixed
 
 __all__ = ["Placement", "close_joints", "placed_assembly", "step"]
 
 CLOSED = 1e-9
 """Joints are closed when no held motion is off by more than this (scaled lengths, radians)."""
+
+NEARLY = 1e3
+"""Where joints contradict each other a little, gaps this many times as wide are as good as it gets."""
+
+STALLED = 0.8
+"""No more is to be gained when the widest gap shrinks by less than this: on a path it falls a thousandfold,
+elsewhere to a quarter."""
 
 ITERATIONS = 40
 """Gauss-Newton steps: on a path it takes five; where there is none each step halves the distance."""
@@ -72,8 +79,10 @@ def step(placement: Placement, twists: Array) -> Placement:
     )
 
 
-def _links(kin: Kinematics, parts: tuple[int, ...], links: list[int]) -> _Links:
-    place = {p: k for k, p in enumerate(parts)}
+def _links(
+    kin: Kinematics, bodies: tuple[int, ...], links: list[int], place: dict[int, int]
+) -> _Links:
+    """Return links as arrays; `place` says which of the bodies, given by a part each, a part is of."""
     joints, supports = kin.assembly.joints, kin.assembly.supports
     count = len(joints)
     points = np.zeros((len(links), 3))
@@ -88,7 +97,7 @@ def _links(kin: Kinematics, parts: tuple[int, ...], links: list[int]) -> _Links:
         else:
             support = supports[k - count]
             points[row] = kin.origins[support.part] if support.point is None else support.point
-    origins = kin.origins[list(parts)]
+    origins = kin.origins[list(bodies)]
     arms = points[:, None, :] - np.where(owner[..., None] < 0, 0.0, origins[owner])
     return _Links(owner, points, axes, arms, kin.held[links], universal)
 
@@ -152,34 +161,63 @@ def close_joints(
     Placement or None
         None when the joints could not be closed.
     """
-    arrays = _links(kin, parts, links)
+    heads = merge_fixed(kin, parts, links)
+    bodies = tuple(sorted(set(heads.values())))
+    number = {h: k for k, h in enumerate(bodies)}
+    body = np.array([number[heads[p]] for p in parts])
+    owners = {p: int(b) for p, b in zip(parts, body, strict=True)}
+    outer = [k for k in links if len({owners[p] for p in kin.owners[k]}) == len(kin.owners[k])]
+    arrays = _links(kin, bodies, outer, owners)
+    first = np.array([parts.index(h) for h in bodies])
+    here = _close(
+        kin,
+        arrays,
+        _gaps(arrays, start(kin, bodies), kin.length),
+        Placement(moved.origins[first], moved.turns[first]),
+    )
+    if here is None:
+        return None
+    turns = here.turns[body]
+    arms = kin.origins[list(parts)] - kin.origins[list(bodies)][body]
+    return Placement(here.origins[body] + np.einsum("kij,kj->ki", turns, arms), turns)
+
+
+def _close(kin: Kinematics, arrays: _Links, target: Array, moved: Placement) -> Placement | None:
+    """Return the placement near `moved` in which the gaps of all joints are those of `target`."""
     dofs = kin.dofs
-    target = _gaps(arrays, start(kin, parts), kin.length)
     here = moved
+    before = np.inf
     for _ in range(ITERATIONS):
         gaps = (_gaps(arrays, here, kin.length) - target)[arrays.held]
-        if np.abs(gaps).max(initial=0.0) < CLOSED:
+        widest = float(np.abs(gaps).max(initial=0.0))
+        if widest < CLOSED or NEARLY * CLOSED > widest > STALLED * before:
             return here
+        before = widest
         j = _jacobian(arrays, here, kin.length, dofs)
         normal = sparse.csc_array(j.T @ j)
         damping = DAMPING * float(normal.diagonal().max())
         matrix = sparse.csc_array(normal + damping * sparse.eye_array(normal.shape[0]))
         try:
-            change = sparse_linalg.splu(matrix).solve(-(j.T @ gaps))
+            factor = sparse_linalg.splu(
+                matrix,
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
         except RuntimeError:
             return None
-        twists = np.zeros((len(parts), 6))
-        twists[:, dofs] = change.reshape(len(parts), -1)
+        twists = np.zeros((len(here.origins), 6))
+        twists[:, dofs] = factor.solve(-(j.T @ gaps)).reshape(len(twists), -1)
         here = step(here, twists * kin.units)
     gaps = (_gaps(arrays, here, kin.length) - target)[arrays.held]
-    return here if np.abs(gaps).max(initial=0.0) < 1e3 * CLOSED else None
+    return here if np.abs(gaps).max(initial=0.0) < NEARLY * CLOSED else None
 
 
 def placed_assembly(
     kin: Kinematics, parts: tuple[int, ...], links: list[int], placement: Placement
 ) -> Assembly:
     """Return the assembly with a component moved to a placement; other components stay."""
-    arrays = _links(kin, parts, links)
+    arrays = _links(kin, parts, links, {p: k for k, p in enumerate(parts)})
     points, axes = _sides(arrays, placement)
     new_parts = list(kin.assembly.parts)
     for k, p in enumerate(parts):

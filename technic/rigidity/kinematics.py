@@ -21,7 +21,7 @@ from technic.rigidity.nullspace import Block, NullSpace, null_space
 from technic.system.rows import transfer
 from technic.tolerances import MOBILITY_CUT, MOBILITY_LENGTH
 
-__all__ = ["ComponentMotions", "Kinematics", "component_motions", "kinematics"]
+__all__ = ["ComponentMotions", "Kinematics", "component_motions", "kinematics", "merge_fixed"]
 
 PLANE = np.array([0, 1, 5])
 """Unknowns of a twist that stay in the plane z = 0."""
@@ -183,7 +183,7 @@ def component_motions(
     dofs = kin.dofs
     width = len(dofs)
     grounded = any(len(kin.owners[k]) == 1 for k in links)
-    bodies = _merge_fixed(kin, parts, links)
+    bodies = merge_fixed(kin, parts, links)
     heads = sorted(set(bodies.values()))
     number = {h: k for k, h in enumerate(heads)}
     body = np.array([number[bodies[p]] for p in parts])
@@ -278,7 +278,7 @@ def _head(heads: dict[tuple[bytes, int], int], key: bytes, part: int) -> int:
     return part
 
 
-def _merge_fixed(kin: Kinematics, parts: tuple[int, ...], links: list[int]) -> dict[int, int]:
+def merge_fixed(kin: Kinematics, parts: tuple[int, ...], links: list[int]) -> dict[int, int]:
     """Return, for each part, the head of the body it belongs to: fixed joints make one body of two.
 
     The head is the part nearest to the body's middle, so that arms stay short.

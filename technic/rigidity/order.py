@@ -20,9 +20,10 @@ __all__ = ["FINITE", "FIRST_ORDER", "split_by_order"]
 FINITE = "finite"
 FIRST_ORDER = "first-order"
 
-STEP = 0.2
+STEPS = (0.2, 0.05)
 """How far the part that goes furthest is moved (scaled: 8 LDU, or 0.2 rad): far enough that what stiffens
-does so well above the tolerance for motions, and near enough to stay on the same branch."""
+does so well above the tolerance for motions. Where the path is so bent that the joints close near the start
+again, a quarter of that."""
 
 MOVED = 0.1
 """A step counts as made when this share of it is left after the joints are closed: on a path nearly all
@@ -83,10 +84,8 @@ def _finite_directions(
     for trial in range(TRIALS):
         share = np.random.default_rng(trial).normal(size=space.size)
         twists = space.lift(motions, space.basis @ share)
-        twists = twists * (STEP / np.abs(twists).max())
-        there = step(start(kin, motions.parts), twists * kin.units)
-        placement = close_joints(kin, motions.parts, closing, there)
-        if placement is None or _progress(kin, motions, placement, there) < MOVED:
+        placement = _reached(kin, motions.parts, closing, twists / np.abs(twists).max())
+        if placement is None:
             continue
         moved = kinematics(placed_assembly(kin, motions.parts, links, placement))
         later = component_motions(moved, component, cut)
@@ -98,11 +97,21 @@ def _finite_directions(
     return best
 
 
-def _progress(
-    kin: Kinematics, motions: ComponentMotions, placement: Placement, aim: Placement
-) -> float:
+def _reached(
+    kin: Kinematics, parts: tuple[int, ...], closing: list[int], twists: Array
+) -> Placement | None:
+    """Return where a real step along scaled twists ends, or None when it leads nowhere."""
+    begin = start(kin, parts)
+    for size in STEPS:
+        there = step(begin, size * twists * kin.units)
+        placement = close_joints(kin, parts, closing, there)
+        if placement is not None and _progress(kin, begin, placement, there) >= MOVED:
+            return placement
+    return None
+
+
+def _progress(kin: Kinematics, begin: Placement, placement: Placement, aim: Placement) -> float:
     """Return how much of the step is left: the movement along it, as a share."""
-    begin = start(kin, motions.parts)
     wanted = np.hstack(
         [(aim.origins - begin.origins) / kin.length, (aim.turns - begin.turns).reshape(-1, 9)]
     )

@@ -144,6 +144,9 @@ class Rigidity:
         Relative residual of the eigenpair.
     interval_95 : (float, float) or None
         From the covariance of calibrated stiffnesses; None when nothing is calibrated.
+    rigid_walls : float or None
+        The same number (N/m) with bores that keep their shape: the truth lies between `value` and it;
+        None when it was not asked for.
     """
 
     value: float
@@ -151,6 +154,7 @@ class Rigidity:
     measure: str
     residual: float
     interval_95: tuple[float, float] | None = None
+    rigid_walls: float | None = None
 
     @property
     def compliance_mm_per_n(self) -> float:
@@ -174,12 +178,16 @@ class Mode:
     forces : (p, 6) array_like
         Force (N) and moment about the centroid (N m) on every part of the load that causes it, for
         the same displacement: ``value * M x``.
+    displacements : mapping of int to (m, 3) arrays
+        Per part: the displacement of its nodes, which ``RigidityReport.node_points`` places (m, for an
+        RMS of 1 m).
     """
 
     value: float
     unknowns: Array
     twists: Array
     forces: Array
+    displacements: Mapping[int, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("unknowns", "twists", "forces"):

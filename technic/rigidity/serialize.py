@@ -123,6 +123,9 @@ def _rigidity(rigidity: Rigidity | None) -> dict[str, Any] | None:
         "interval_95": None if rigidity.interval_95 is None else list(rigidity.interval_95),
         "measure": rigidity.measure,
         "residual": rigidity.residual,
+        "port_walls": None
+        if rigidity.rigid_walls is None
+        else {"mean_n_per_m": rigidity.value, "rigid_n_per_m": rigidity.rigid_walls},
     }
 
 

@@ -18,6 +18,9 @@ from technic.tolerances import MOTION_KIND_CUT
 
 __all__ = ["StructuralSpace", "cluster_field", "sparse_basis", "structural_space"]
 
+HELD = 1e-9
+"""A body that moves less than this in every motion that is left is held already."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StructuralSpace:
@@ -179,6 +182,47 @@ def _independent(space: Array, bodies: int) -> list[tuple[int, ...]]:
     return connected_groups([int(b) for b in moving], pairs)
 
 
+def _hold_others(blocks: Array, body: int, moving: list[int]) -> Array:
+    """Return the motions, (count, r), left when as many other bodies are held, one after another, as leave
+    `body` a motion.
+
+    Bodies are held in groups that grow while that succeeds and are halved when it does not: the outcome is
+    that of holding them one at a time.
+    """
+    still = np.eye(blocks.shape[2])
+    waiting = np.array([b for b in moving if b != body], dtype=np.int64)
+    group = 1
+    while len(waiting) and still.shape[1] > 1:
+        rows = (blocks[waiting[:group]] @ still).reshape(-1, still.shape[1])
+        if np.abs(rows).max() <= HELD:
+            waiting = waiting[group:]
+            group *= 2
+            continue
+        squares, vectors = np.linalg.eigh(rows.T @ rows)
+        trial = still @ vectors[:, squares < MOTION_KIND_CUT**2]
+        if trial.shape[1] and np.abs(blocks[body] @ trial).max() > MOTION_KIND_CUT:
+            still = trial
+            waiting = waiting[group:]
+            group *= 2
+        elif group == 1:
+            waiting = waiting[1:]
+        else:
+            group //= 2
+    return still
+
+
+def _unlike(blocks: Array, moving: list[int]) -> list[int]:
+    """Return one of each set of bodies that stand still in the same motions: held one, held all."""
+    _, values, rows = np.linalg.svd(blocks[moving], full_matrices=False)
+    rows = rows * (values >= MOTION_KIND_CUT)[..., None]
+    probe = np.cos(np.arange(2.0 * blocks.shape[2]) ** 2).reshape(-1, 2)
+    marks = np.round(np.swapaxes(rows, 1, 2) @ (rows @ probe), 6) + 0.0
+    first: dict[bytes, int] = {}
+    for body, mark in zip(moving, marks, strict=True):
+        first.setdefault(mark.tobytes(), body)
+    return list(first.values())
+
+
 def _search(space: Array, bodies: int) -> list[Array]:
     """Return a basis of a space that does not fall apart; see `sparse_basis`."""
     count = space.shape[1]
@@ -186,23 +230,14 @@ def _search(space: Array, bodies: int) -> list[Array]:
         return []
     blocks = space.reshape(bodies, 6, count)
     size = np.linalg.norm(blocks, axis=(1, 2))
-    moving = [b for b in range(bodies) if size[b] > MOTION_KIND_CUT]
+    moving = _unlike(blocks, [b for b in range(bodies) if size[b] > MOTION_KIND_CUT])
     found: list[Array] = []
     for body in moving:
-        still = np.eye(count)
-        for other in moving:
-            if other == body or still.shape[1] == 1:
-                continue
-            _, values, vt = np.linalg.svd(blocks[other] @ still, full_matrices=True)
-            values = np.concatenate([values, np.zeros(still.shape[1] - len(values))])[
-                : still.shape[1]
-            ]
-            trial = still @ vt[values < MOTION_KIND_CUT].T
-            if trial.shape[1] and np.abs(blocks[body] @ trial).max() > MOTION_KIND_CUT:
-                still = trial
-        _, _, vt = np.linalg.svd(blocks[body] @ still)
-        vector = (space @ (still @ vt[0])).reshape(bodies, 6)
-        found.append(vector / np.abs(vector).max())
+        still = _hold_others(blocks, body, moving)
+        _, values, vt = np.linalg.svd(blocks[body] @ still, full_matrices=False)
+        for share in vt[values > MOTION_KIND_CUT]:
+            vector = (space @ (still @ share)).reshape(bodies, 6)
+            found.append(vector / np.abs(vector).max())
     found.sort(key=lambda v: int(np.sum(np.linalg.norm(v, axis=1) > MOTION_KIND_CUT)))
     chosen: list[Array] = []
     taken = np.zeros((space.shape[0], 0))

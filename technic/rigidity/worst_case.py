@@ -53,7 +53,7 @@ def mode_of(
     weight = system.M if measure == "mean_square" else system.nodal()
     load = system.R.T @ (weight @ unknowns) * value
     twists = np.einsum("pij,pj->pi", inverse_inertia, momentum)
-    return Mode(value, unknowns, twists, load.reshape(-1, 6))
+    return Mode(value, unknowns, twists, load.reshape(-1, 6), node_fields(system, unknowns)[1])
 
 
 def weak_spots(system: System, unknowns: Array) -> tuple[WeakSpot, ...]:
