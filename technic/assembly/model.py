@@ -198,6 +198,8 @@ class FindingKind(StrEnum):
     """A part that is not one rigid body: motor, actuator, shock absorber, universal joint."""
     OVERRIDE = "override"
     """What the user corrected in a file of his own."""
+    MATERIAL = "material"
+    """What the user said a part is made of."""
     GEARS = "gears"
     """Two gears in mesh."""
     WARNING = "warning"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from technic.assembly.model import Assembly, Part, Support
 from technic.errors import UsageError
 
-__all__ = ["PartChoice", "find_part", "find_place", "parse_fix"]
+__all__ = ["PartChoice", "find_part", "find_parts", "find_place", "parse_fix"]
 
 _SHOWN = 8
 """Candidates listed in an error message: enough to choose from, few enough to read."""
@@ -54,6 +54,17 @@ def _matches(assembly: Assembly, text: str) -> list[int]:
     if ends:
         return ends
     return [k for k, part in enumerate(assembly.parts) if wanted in _numbers(part)]
+
+
+def find_parts(assembly: Assembly, text: str) -> list[int]:
+    """Return all parts that `text` can mean: one by its id, or every part of a number.
+
+    Raises
+    ------
+    UsageError
+        There is none.
+    """
+    return _matches(assembly, text) or [find_part(assembly, text)]
 
 
 def find_part(assembly: Assembly, text: str) -> int:

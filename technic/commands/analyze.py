@@ -19,12 +19,14 @@ from technic.commands.options import (
     GltfOption,
     HeatmapOption,
     JsonOption,
+    MaterialOption,
     MeasureOption,
     MinRigidityOption,
     ModelOptions,
     ModesOption,
     PartModelOption,
     PictureOption,
+    PortWallsOption,
     QuietOption,
     RendererOption,
     ReportOption,
@@ -34,7 +36,7 @@ from technic.commands.options import (
 )
 from technic.commands.outputs import Outputs
 from technic.commands.reading import model_options, reading
-from technic.commands.solids import make_solids
+from technic.commands.solids import make_solids, make_walls
 
 if TYPE_CHECKING:
     from technic.rigidity.result import RigidityReport
@@ -82,6 +84,7 @@ def run(model: Path, options: AnalysisOptions) -> None:
     typer.Exit
         With code 1 when the model is below what was demanded.
     """
+    from technic.assembly.materials import apply_materials, parse_materials
     from technic.assembly.select import parse_fix
     from technic.loading import load
     from technic.report.json import STDOUT, write_json
@@ -94,12 +97,16 @@ def run(model: Path, options: AnalysisOptions) -> None:
         if options.fix:
             supports = tuple(parse_fix(assembly, text) for text in options.fix)
             assembly = replace(assembly, supports=assembly.supports + supports)
+        assembly = apply_materials(assembly, parse_materials(assembly, options.material))
         make_solids(assembly, options.parts, quiet=options.quiet)
+        if options.port_walls == "rigid" and options.parts == "solid":
+            make_walls(assembly, quiet=options.quiet)
         report = analyze_assembly(
             assembly,
             measure=options.measure,
             modes=options.modes,
             parts=options.parts,
+            port_walls=options.port_walls,
             table=how.get("table"),
         )
         if options.json is not None:
@@ -140,6 +147,8 @@ def analyze(
     how: ModelOptions = AS_FOUND,
     modes: ModesOption = 6,
     parts: PartModelOption = "solid",
+    port_walls: PortWallsOption = "mean",
+    material: MaterialOption = None,
     require_rigid: RequireRigidOption = False,
     min_rigidity: MinRigidityOption = None,
     quiet: QuietOption = False,
@@ -164,6 +173,8 @@ def analyze(
             how=how,
             modes=modes,
             parts=parts,
+            port_walls=port_walls,
+            material=tuple(material or ()),
             require_rigid=require_rigid,
             min_rigidity=min_rigidity,
             quiet=quiet,

@@ -28,6 +28,7 @@ __all__ = [
     "LibraryOption",
     "LibrarySolids",
     "LibrarySolidsOption",
+    "MaterialOption",
     "Measure",
     "MeasureOption",
     "MinRigidityOption",
@@ -38,6 +39,8 @@ __all__ = [
     "PartModel",
     "PartModelOption",
     "PictureOption",
+    "PortWalls",
+    "PortWallsOption",
     "QuietOption",
     "RendererOption",
     "ReportOption",
@@ -55,6 +58,7 @@ Gears = Literal["off", "on"]
 InnerMotion = Literal["held", "free"]
 LibrarySolids = Literal["draft", "fine", "off"]
 PartModel = Literal["solid", "frame", "rigid"]
+PortWalls = Literal["mean", "rigid"]
 View = Literal["iso", "front", "side", "top", "mode"]
 Renderer = Literal["pyvista", "pyrender"]
 """The values that `technic.rigidity.analyze.analyze`, the LDraw reader and the pictures take."""
@@ -194,6 +198,23 @@ PartModelOption = Annotated[
         "bend; rigid: only joints give way.",
     ),
 ]
+PortWallsOption = Annotated[
+    PortWalls,
+    typer.Option(
+        "--port-walls",
+        help="rigid: also give the answer with bores that keep their shape, the stiffest that it can "
+        "be; models for it are built when first needed and kept in the cache.",
+    ),
+]
+MaterialOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--material",
+        metavar="NAME|PART=NAME",
+        help="Material of the whole model, of a part, or of all parts of a number: ABS, PC, POM, PA. "
+        "May be repeated.",
+    ),
+]
 RequireRigidOption = Annotated[
     bool, typer.Option("--require-rigid", help="Exit with 1 when the model is not rigid.")
 ]
@@ -270,6 +291,8 @@ class AnalysisOptions:
     measure: Measure = "mean_square"
     modes: int = 6
     parts: PartModel = "solid"
+    port_walls: PortWalls = "mean"
+    material: tuple[str, ...] = ()
     require_rigid: bool = False
     min_rigidity: float | None = None
     quiet: bool = False

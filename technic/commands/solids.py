@@ -1,4 +1,4 @@
-"""Solid models of library parts are made before an analysis: in parallel, with a bar that shows it."""
+"""Solid models that are not shipped are made before an analysis: in parallel, with a bar that shows it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from technic.assembly.model import Assembly
+    from technic.system.assemble import Probe
+    from technic.system.port_walls import RigidWalls
 
-__all__ = ["make_solids"]
+__all__ = ["make_solids", "make_walls"]
 
 
 def make_solids(assembly: Assembly, parts: str, *, quiet: bool) -> None:
@@ -28,12 +30,24 @@ def make_solids(assembly: Assembly, parts: str, *, quiet: bool) -> None:
         return
     from technic.system.drawn_solids import prepare
 
-    with _bar(shown=not quiet and sys.stderr.isatty()) as progress:
+    with _bar("library parts", shown=not quiet and sys.stderr.isatty()) as progress:
         prepare(assembly, progress=progress)
 
 
+def make_walls(
+    assembly: Assembly, *, probes: tuple[Probe, ...] = (), quiet: bool = False
+) -> RigidWalls:
+    """Make, or find in the cache, the solid models with rigid walls in the bores in use."""
+    import os
+
+    from technic.system.port_walls import rigid_walls
+
+    with _bar("parts with rigid bores", shown=not quiet and sys.stderr.isatty()) as progress:
+        return rigid_walls(assembly, probes=probes, jobs=os.cpu_count() or 1, progress=progress)
+
+
 @contextmanager
-def _bar(*, shown: bool) -> Iterator[Callable[[int, int, str], None] | None]:
+def _bar(what: str, *, shown: bool) -> Iterator[Callable[[int, int, str], None] | None]:
     """Show a bar on the terminal, once there is something to show; yields what moves it on."""
     if not shown:
         yield None
@@ -42,7 +56,7 @@ def _bar(*, shown: bool) -> Iterator[Callable[[int, int, str], None] | None]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     columns = (
-        TextColumn("meshing library parts"),
+        TextColumn(f"meshing {what}"),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("{task.description}"),

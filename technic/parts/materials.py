@@ -11,10 +11,26 @@ from technic.errors import UsageError
 from technic.parts.definition import Material, PartDefinition, Section
 from technic.units import MM
 
-__all__ = ["ABS", "material", "material_of", "materials", "sections"]
+__all__ = ["ABS", "MIXED", "SOFT", "material", "material_of", "materials", "sections"]
 
 ABS = "ABS"
 """Name of the material of everything that names none."""
+
+
+SOFT = ("SEBS",)
+"""Rubber: what is made of it is not meant when a model is said to be of another plastic."""
+
+MIXED = (
+    "hub-ev3",
+    "hub-spike",
+    "hub-cplus",
+    "linear-actuator",
+    "motor",
+    "sensor",
+    "shock-absorber",
+    "tyre",
+)
+"""Families (by their beginning) of parts that are of several materials: their mass is a weighed one."""
 
 
 def _table(name: str) -> dict[str, Any]:

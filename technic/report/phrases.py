@@ -30,6 +30,7 @@ FINDING_WORDS = {
     FindingKind.FLEXIBLE: ("flexible item, not modelled", "flexible items, not modelled"),
     FindingKind.INNER: ("part with inner motion", "parts with inner motion"),
     FindingKind.OVERRIDE: ("correction of yours", "corrections of yours"),
+    FindingKind.MATERIAL: ("material that you chose", "materials that you chose"),
     FindingKind.GEARS: ("pair of gears in mesh", "pairs of gears in mesh"),
     FindingKind.WARNING: ("warning", "warnings"),
 }

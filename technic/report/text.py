@@ -201,6 +201,12 @@ def _rigidity(report: RigidityReport, style: Style) -> list[str]:
             f"   How sure: the measured joints alone leave {number(low)} to {number(high)} N/m "
             "with 95 % confidence."
         )
+    if rigidity.rigid_walls is not None:
+        lines += style.wrap(
+            f"Bores give as the mean over their wall; if they kept their shape it would be "
+            f"{number(rigidity.rigid_walls)} N/m: the truth lies between.",
+            "   ",
+        )
     if report.mobility.total > report.mobility.idle:
         lines += style.wrap(
             "The motions above cost nothing; this number is for what bends once they stand still.",

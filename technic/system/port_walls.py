@@ -24,7 +24,8 @@ from technic.fem.solid.superelement import SuperElement, frames_in_use
 from technic.geometry import Array
 from technic.parts.definition import PartDefinition
 from technic.parts.materials import material_of
-from technic.system.part_models import ElementFactory, element_from, framed, solid_element_of
+from technic.system.assemble import Probe, assemble
+from technic.system.part_models import element_from, framed, solid_element_of
 from technic.system.solid_cache import Refusal, recall, remember
 
 __all__ = ["DRAFT", "PortWalls", "RigidWalls", "Walled", "build_walled", "rigid_walls"]
@@ -37,6 +38,8 @@ DRAFT: Final = MeshSettings(cell=1.2e-3)
 
 VERSION: Final = 1
 """Raised when the method changes in a way that changes the matrices."""
+
+_memory: dict[str, SuperElement | Refusal] = {}
 
 Progress = Callable[[int, int, str], None]
 """Called with how many models are done, how many there are, and the title of the last one."""
@@ -121,8 +124,8 @@ def _wanted(part: Part, points: Array, ports: tuple[str | None, ...]) -> Walled 
 
 def rigid_walls(
     assembly: Assembly,
-    assemble: Callable[[Assembly, ElementFactory], object],
     *,
+    probes: tuple[Probe, ...] = (),
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> RigidWalls:
@@ -131,8 +134,8 @@ def rigid_walls(
     Parameters
     ----------
     assembly : Assembly
-    assemble : callable
-        Assembles it with the elements that it is given, in the same way as afterwards (same probes).
+    probes : tuple of Probe
+        As it is assembled with afterwards.
     jobs : int
         Processes.
     progress : callable, optional
@@ -145,19 +148,19 @@ def rigid_walls(
             needed[wanted] = None
         return solid_element_of(part, points, ports)
 
-    assemble(assembly, note)
+    assemble(assembly, element=note, probes=probes)
     keys = {wanted: wanted.key for wanted in needed}
     models: dict[Walled, SuperElement | Refusal] = {}
     missing = []
     for wanted, key in keys.items():
-        found = recall(key, wanted.definition.id)
+        found = _memory.get(key) or recall(key, wanted.definition.id)
         if found is None:
             missing.append(wanted)
         else:
             models[wanted] = found
     for done, (wanted, made) in enumerate(_built(missing, keys, jobs), 1):
         remember(keys[wanted], wanted.definition.id, made)
-        models[wanted] = made
+        models[wanted] = _memory[keys[wanted]] = made
         if progress is not None:
             progress(done, len(missing), wanted.definition.title)
     return RigidWalls(models)
