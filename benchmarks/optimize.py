@@ -129,6 +129,7 @@ def compare(sizes: list[int], torch: Any) -> None:
         value, slope = rival()
         apart = abs(slope - slopes[0][:, :2]).max() / abs(slope).max()
         assert abs(value - values[0]) < 1e-6 * values[0]
+        assert apart < 1e-6
         theirs = timed(rival, 3)
         print(_line([*row, 1e3 * theirs, theirs / ours, apart]))
 
