@@ -23,10 +23,10 @@ from technic.rigidity.result import RigidityReport
 from technic.rigidity.serialize import unit_load
 from technic.units import MM
 
-__all__ = ["comparison_scene"]
+__all__ = ["common_scale", "comparison_scene"]
 
 
-def _scale(reports: Sequence[RigidityReport], drawings: Sequence[Drawing]) -> float:
+def common_scale(reports: Sequence[RigidityReport], drawings: Sequence[Drawing]) -> float:
     """Return the one factor by which all deformations are drawn: that of the softest model."""
     scales = []
     for report, drawing in zip(reports, drawings, strict=True):
@@ -64,7 +64,7 @@ def comparison_scene(
     view : {"iso", "front", "side", "top", "mode"}
     """
     drawings = [drawing_of(report.assembly) for report in reports]
-    scale = _scale(reports, drawings)
+    scale = common_scale(reports, drawings)
     field = worst_field(reports[0])
     toward, up = sight(
         reports[0].assembly,

@@ -263,7 +263,7 @@ def styled(scene: Scene, *, transparent: bool = False, depth: bool = False) -> S
         legend = (
             LegendItem("patch", NEAR_SHADE, "nearest"),
             LegendItem("patch", FAR_SHADE, far),
-            *legend,
+            *(item for item in legend if item.swatch != "line"),  # no outlines are drawn
         )
     return replace(scene, legend=legend, transparent=transparent, depth=depth)
 

@@ -15,7 +15,7 @@ from technic.report.scene import Camera, LegendItem, Lines, Panel, Scene, Surfac
 from technic.report.wording import count, number
 from technic.rigidity.result import RigidityReport
 
-__all__ = ["before_after_scene"]
+__all__ = ["before_after_scene", "state_words"]
 
 _PALE = 0.6
 """How far the present parts are faded beside new ones."""
@@ -45,8 +45,8 @@ def before_after_scene(before: RigidityReport, after: RigidityReport) -> Scene:
         said = f"{count(len(new), 'new part')} ({color_name(color)})"
         legend = (LegendItem("patch", color_rgb(color), said),)
     panels = (
-        _panel(f"before: {_state(before)}", before.assembly, frozenset(), camera),
-        _panel(f"after: {_state(after)}", after.assembly, frozenset(new), camera),
+        _panel(f"before: {state_words(before)}", before.assembly, frozenset(), camera),
+        _panel(f"after: {state_words(after)}", after.assembly, frozenset(new), camera),
     )
     return Scene(title, subtitle, panels, legend)
 
@@ -68,7 +68,8 @@ def _layers(
     return model_layers(drawing, drawing.points, pale=pale)
 
 
-def _state(report: RigidityReport) -> str:
+def state_words(report: RigidityReport) -> str:
+    """Return verdict, motions and rigidity in a few words."""
     said = report.verdict.value
     if report.mobility.structural:
         said += f", {count(report.mobility.structural, 'motion')}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -122,12 +124,38 @@ def test_heat_map_needs_an_ldraw_model(run, tmp_path):
 
 
 def test_viewer_is_the_built_one():
-    """The bundle belongs to the sources: it knows every control and every uniform of theirs."""
-    bundle = (REPO / "technic/report/html/assets/viewer.js").read_text(encoding="utf-8")
-    for source in (REPO / "web" / "src").glob("*.js"):
-        for piece in source.read_text(encoding="utf-8").split('byId("')[1:]:
-            assert f'"{piece.split(chr(34))[0]}"' in bundle
-    template = (REPO / "technic/report/html/templates/page.html.j2").read_text(encoding="utf-8")
-    for piece in (REPO / "web/src/viewer.js").read_text(encoding="utf-8").split('byId("')[1:]:
-        name = piece.split('"')[0]
-        assert f'id="{name}"' in template
+    """The bundle says from which sources it was made: those in web/; and nobody changed it since."""
+    content = (REPO / "technic/report/html/assets/viewer.js").read_bytes()
+    first, _, bundle = content.partition(b"\n")
+    said = re.fullmatch(
+        rb"/\* technic viewer; sources ([0-9a-f]{64}); bundle ([0-9a-f]{64}) \*/", first
+    )
+    assert said is not None, "run scripts/build_viewer"
+    web = REPO / "web"
+    names = ["package.json", *(f"src/{path.name}" for path in (web / "src").glob("*.js"))]
+    # As sha256sum lists them, in the order of their bytes.
+    listed = "".join(
+        f"{hashlib.sha256((web / name).read_bytes()).hexdigest()}  {name}\n"
+        for name in sorted(names)
+    )
+    assert said[1].decode() == hashlib.sha256(listed.encode()).hexdigest(), (
+        "run scripts/build_viewer"
+    )
+    assert said[2].decode() == hashlib.sha256(bundle).hexdigest()
+
+
+@pytest.mark.parametrize(
+    ("template", "sources"),
+    [("page", ("viewer", "list", "marks", "main")), ("suggest", ("compare", "main"))],
+)
+def test_viewer_finds_what_it_asks_for(template, sources):
+    """Every element that the sources look up by name is in the page that they work on."""
+    folder = REPO / "technic/report/html/templates"
+    html = "".join(
+        (folder / f"{name}.html.j2").read_text(encoding="utf-8") for name in ("base", template)
+    )
+    html += html.replace("{{ side }}", "before") + html.replace("{{ side }}", "after")
+    for source in sources:
+        script = (REPO / "web" / "src" / f"{source}.js").read_text(encoding="utf-8")
+        for name in re.findall(r'(?:byId|getElementById)\("([^"]+)"\)', script):
+            assert f'id="{name}"' in html

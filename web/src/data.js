@@ -3,6 +3,7 @@
 const KINDS = {
   float32: Float32Array,
   uint32: Uint32Array,
+  int16: Int16Array,
   uint16: Uint16Array,
   uint8: Uint8Array,
 };
@@ -29,17 +30,23 @@ export function unpackEdges(faces, flags) {
   return new Uint16Array(edges);
 }
 
-/** Unpack the block and return the contents with a function that finds an array in it. */
-export async function readModel() {
+/** Unpack the block; return the contents, and a function that opens a model in it. */
+export async function readPage() {
   const contents = JSON.parse(document.getElementById("contents").textContent);
   const text = document.getElementById("block").textContent.trim();
   const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   const buffer = await new Response(stream).arrayBuffer();
   const array = (place) => new KINDS[place.type](buffer, place.at, place.length);
+  return { contents, open: (model) => openModel(model, array) };
+}
+
+/** Return a model: its table of contents, what finds its arrays, and its parts. */
+function openModel(contents, array) {
   const told = JSON.parse(new TextDecoder().decode(array(contents.parts)));
+  const energies = array(contents.energy);
   const parts = told.rows.map(
-    ([number, name, color, submodel, step, line, fastener, standIn, energy], index) => ({
+    ([number, name, color, submodel, step, line, fastener, standIn], index) => ({
       index,
       number: told.words[number],
       name: told.words[name],
@@ -49,7 +56,7 @@ export async function readModel() {
       line,
       fastener: fastener === 1,
       standIn: standIn === 1,
-      energy,
+      energy: energies[index],
     }),
   );
   return { contents, array, parts };

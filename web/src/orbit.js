@@ -5,8 +5,15 @@ import { PerspectiveCamera, Vector3 } from "three";
 const FIELD = 26;
 const ROOM = 1.22; // for the deformation and the arrows
 const STEEPEST = 1.553;
-const UP = new Vector3(0, -1, 0); // LDraw: y points down
 const STILL = window.matchMedia("(prefers-reduced-motion: reduce)");
+
+/** Fixed views: directions from the model to the eye, in LDraw's axes. */
+export const VIEWS = {
+  front: [0, 0, -1],
+  side: [1, 0, 0],
+  top: [0, -1, 0],
+  iso: [0.577, -0.577, -0.577],
+};
 
 export class Orbit {
   /**
@@ -15,7 +22,10 @@ export class Orbit {
    * @param {() => void} changed called when there is something new to draw
    */
   constructor(element, contents, changed) {
-    const { half, extremes, toward } = contents;
+    const { half, extremes, toward, axes } = contents;
+    // Angles are counted in LDraw's axes (x right, y down, z away); the model may have others.
+    this.columns = [0, 1, 2].map((c) => new Vector3(axes[c], axes[3 + c], axes[6 + c]));
+    this.up = this.columns[1].clone().negate();
     this.element = element;
     this.half = half;
     this.extremes = extremes.map((point) => new Vector3(...point));
@@ -26,29 +36,40 @@ export class Orbit {
     this.pointers = new Map();
     this.look(toward);
     this.distance = this.fitted();
-    this.listen();
+    this.listen(element);
   }
 
   /** Turn the camera so that it looks from a direction, without moving its target. */
   look(toward) {
-    this.azimuth = Math.atan2(toward[0], -toward[2]);
-    this.elevation = Math.asin(Math.max(-1, Math.min(1, -toward[1])));
+    const direction = new Vector3(...toward);
+    const [x, y, z] = this.columns.map((column) => column.dot(direction));
+    this.azimuth = Math.atan2(x, -z);
+    this.elevation = Math.asin(Math.max(-1, Math.min(1, -y)));
     this.elevation = Math.max(-STEEPEST, Math.min(STEEPEST, this.elevation));
+  }
+
+  /** Return a direction in LDraw's axes as one in those of the model. */
+  turned([x, y, z]) {
+    const [right, down, away] = this.columns;
+    return new Vector3()
+      .addScaledVector(right, x)
+      .addScaledVector(down, y)
+      .addScaledVector(away, z);
   }
 
   toward() {
     const level = Math.cos(this.elevation);
-    return new Vector3(
+    return this.turned([
       Math.sin(this.azimuth) * level,
       -Math.sin(this.elevation),
       -Math.cos(this.azimuth) * level,
-    );
+    ]);
   }
 
   /** Return the distance from which the whole model is seen, with room for its deformation. */
   fitted() {
     const toward = this.toward();
-    const right = new Vector3().crossVectors(UP, toward).normalize();
+    const right = new Vector3().crossVectors(this.up, toward).normalize();
     const up = new Vector3().crossVectors(toward, right);
     const half = Math.tan((FIELD * Math.PI) / 360) / ROOM;
     const wide = half * Math.max(this.camera.aspect, 0.1);
@@ -68,7 +89,7 @@ export class Orbit {
   apply() {
     const size = Math.hypot(...this.half);
     this.camera.position.copy(this.target).addScaledVector(this.toward(), this.distance);
-    this.camera.up.copy(UP);
+    this.camera.up.copy(this.up);
     this.camera.lookAt(this.target);
     const off = this.camera.position.length();
     this.camera.near = Math.max(off - 2.5 * size, 0.002 * size);
@@ -99,7 +120,7 @@ export class Orbit {
     const pixel =
       (2 * this.distance * Math.tan((FIELD * Math.PI) / 360)) / this.element.clientHeight;
     const toward = this.toward();
-    const right = new Vector3().crossVectors(UP, toward).normalize();
+    const right = new Vector3().crossVectors(this.up, toward).normalize();
     const up = new Vector3().crossVectors(toward, right);
     this.target.addScaledVector(right, -dx * pixel).addScaledVector(up, dy * pixel);
     this.changed();
@@ -140,8 +161,8 @@ export class Orbit {
     return this.flight !== null;
   }
 
-  listen() {
-    const element = this.element;
+  /** Let an element turn the camera. */
+  listen(element) {
     element.addEventListener("pointerdown", (event) => {
       element.setPointerCapture(event.pointerId);
       this.pointers.set(event.pointerId, [event.clientX, event.clientY]);

@@ -75,7 +75,7 @@ uniform float uMost;
 uniform vec3 uRamp[${STOPS}];
 uniform vec3 uPaper;
 out vec3 vView;
-flat out vec3 vColor;
+flat out vec4 vColor;
 
 vec3 heat(float share) {
   float at = clamp(share, 0.0, 1.0) * float(${STOPS - 1});
@@ -87,12 +87,14 @@ void main() {
   int i = int(part + 0.5);
   vec4 state = texel(uState, i);
   vec4 own = fixedOf(i, 5);
-  vColor = uByEnergy ? heat(fixedOf(i, 4).w / max(uMost, 1e-9)) : own.rgb;
+  vec3 ink = uByEnergy ? heat(fixedOf(i, 4).w / max(uMost, 1e-9)) : own.rgb;
   if (uFade) {
     bool moves = movedOf(i, 0).w > 0.5;
-    vColor = moves ? mix(vColor, vec3(0.05, 0.68, 0.26), 0.72) : mix(vColor, uPaper, 0.55);
+    ink = moves ? mix(ink, vec3(0.05, 0.68, 0.26), 0.72) : mix(ink, uPaper, 0.55);
   }
-  if (state.g > 0.5) vColor = mix(vColor, vec3(0.0, 0.55, 1.0), 0.65);
+  if (state.b > 0.5) ink = mix(ink, uPaper, 0.6);
+  if (state.g > 0.5) ink = mix(ink, vec3(0.0, 0.55, 1.0), 0.65);
+  vColor = vec4(ink, uByEnergy ? 1.0 : own.a);
   vec4 seen = modelViewMatrix * vec4(placed(i, position), 1.0);
   vView = seen.xyz;
   gl_Position = state.r > 0.5 ? projectionMatrix * seen : vec4(0.0, 0.0, 2.0, 1.0);
@@ -102,14 +104,15 @@ void main() {
 export const PART_FRAGMENT = `
 precision highp float;
 in vec3 vView;
-flat in vec3 vColor;
+flat in vec4 vColor;
 out vec4 color;
 void main() {
   vec3 normal = normalize(cross(dFdx(vView), dFdy(vView)));
   if (dot(normal, vView) > 0.0) normal = -normal;
   float eye = abs(dot(normal, normalize(vView)));
   float above = max(dot(normal, normalize(vec3(-0.5, 0.8, 0.35))), 0.0);
-  color = vec4(min(vColor * (0.46 + 0.36 * eye + 0.34 * above) + 0.015, 1.0), 1.0);
+  vec3 lit = min(vColor.rgb * (0.46 + 0.36 * eye + 0.34 * above) + 0.015, 1.0);
+  color = vec4(lit, vColor.a);
 }
 `;
 
@@ -124,7 +127,7 @@ void main() {
   vec3 own = uByEnergy ? vec3(0.6) : fixedOf(i, 5).rgb;
   float light = dot(own, vec3(0.3, 0.6, 0.1));
   vColor = uInk.x >= 0.0 ? uInk : (light < 0.18 ? vec3(0.5, 0.53, 0.55) : vec3(0.12, 0.13, 0.14));
-  if (uFade && movedOf(i, 0).w < 0.5) vColor = mix(vColor, uPaper, 0.6);
+  if ((uFade && movedOf(i, 0).w < 0.5) || state.b > 0.5) vColor = mix(vColor, uPaper, 0.6);
   vec4 seen = modelViewMatrix * vec4(placed(i, position), 1.0);
   seen.xyz *= 1.0 - uLift;
   gl_Position = state.r > 0.5 ? projectionMatrix * seen : vec4(0.0, 0.0, 2.0, 1.0);

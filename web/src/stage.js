@@ -68,11 +68,11 @@ function arrowTriangles(radius, length) {
 }
 
 export class Stage {
-  constructor(canvas, model) {
+  constructor(canvas, model, renderer) {
     this.model = model;
     this.canvas = canvas;
     const { contents, array } = model;
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.renderer = renderer ?? new WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, contents.light ? 1.25 : 2));
     this.scene = new Scene();
     this.pickScene = new Scene();
@@ -107,7 +107,7 @@ export class Stage {
   }
 
   fillFixed() {
-    const { contents, array, parts } = this.model;
+    const { contents, array } = this.model;
     const [rotations, translations] = [array(contents.rotations), array(contents.translations)];
     const [inner, colors] = [array(contents.inner), array(contents.colors)];
     const energies = array(contents.energy);
@@ -119,11 +119,10 @@ export class Stage {
         data[at + 4 * row + 3] = translations[3 * k + row];
         data[at + 12 + row] = this.centroids[3 * k + row];
         data[at + 16 + row] = inner[3 * k + row];
-        data[at + 20 + row] = colors[3 * k + row] / 255;
       }
+      for (let c = 0; c < 4; c++) data[at + 20 + c] = colors[4 * k + c] / 255;
       data[at + 15] = 1;
       data[at + 19] = energies[k];
-      data[at + 23] = parts[k].fastener ? 1 : 0;
     }
   }
 
@@ -146,11 +145,14 @@ export class Stage {
 
   addShapes() {
     const { contents, array } = this.model;
-    const solid = this.material(shaders.PART_VERTEX, shaders.PART_FRAGMENT, this.uniforms, {
-      polygonOffset: true,
-      polygonOffsetFactor: 1,
-      polygonOffsetUnits: 1,
-    });
+    const offset = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
+    const part = (options) =>
+      this.material(shaders.PART_VERTEX, shaders.PART_FRAGMENT, this.uniforms, options);
+    const solid = part(offset);
+    // Glass-like parts come after all others.
+    const glass = part({ ...offset, transparent: true });
+    const colors = array(contents.colors);
+    const clear = (k) => colors[4 * k + 3] < 255;
     const pick = this.material(shaders.PICK_VERTEX, shaders.PICK_FRAGMENT, this.uniforms);
     const lines = (ink, opacity, amount) =>
       this.material(
@@ -170,9 +172,10 @@ export class Stage {
       uAmount: { value: 0 },
     });
     for (const shape of contents.shapes) {
-      const members = new InstancedBufferAttribute(Float32Array.from(array(shape.parts)), 1);
+      const own = Float32Array.from(array(shape.parts));
+      const members = new InstancedBufferAttribute(own, 1);
       const points = new BufferAttribute(array(shape.points), 3);
-      const geometry = (indices) => {
+      const geometry = (indices, members) => {
         const made = new InstancedBufferGeometry();
         made.setAttribute("position", points);
         made.setAttribute("part", members);
@@ -181,11 +184,16 @@ export class Stage {
         return made;
       };
       const corners = unpackFaces(array(shape.faces));
-      const faces = geometry(corners);
-      this.add(new Mesh(faces, solid));
-      this.add(new Mesh(faces, pick), this.pickScene);
+      for (const [material, those] of [
+        [solid, own.filter((k) => !clear(k))],
+        [glass, own.filter(clear)],
+      ]) {
+        if (those.length === 0) continue;
+        this.add(new Mesh(geometry(corners, new InstancedBufferAttribute(those, 1)), material));
+      }
+      this.add(new Mesh(geometry(corners, members), pick), this.pickScene);
       if (shape.edges.length === 0) continue;
-      const segments = geometry(unpackEdges(corners, array(shape.edges)));
+      const segments = geometry(unpackEdges(corners, array(shape.edges)), members);
       this.edges.push(this.add(new LineSegments(segments, edge)));
       const outline = this.add(new LineSegments(segments, this.outlineMaterial));
       outline.visible = false;
@@ -252,7 +260,7 @@ export class Stage {
           data[at + 4 + c] = this.twists[6 * k + 3 + c];
         }
         if (bending) {
-          data.set(bending.subarray(60 * k, 60 * k + 60), at + 8);
+          for (let c = 0; c < 60; c++) data[at + 8 + c] = movement.unit * bending[60 * k + c];
           fixed[4 * shaders.FIXED * k + 15] = sizes[k];
         }
       }
@@ -265,6 +273,27 @@ export class Stage {
     this.uniforms.uBends.value = Boolean(movement && movement.bending);
     this.uniforms.uScrew.value = kind === "motion";
     this.uniforms.uFade.value = kind === "motion";
+  }
+
+  /** Colour by energy: what a part's share stands for, and what the darkest colour stands for. */
+  setEnergy(whole, most) {
+    const { contents, array } = this.model;
+    array(contents.energy).forEach((share, k) => {
+      this.fixed.image.data[4 * shaders.FIXED * k + 19] = whole * share;
+    });
+    this.fixed.needsUpdate = true;
+    this.uniforms.uMost.value = most;
+  }
+
+  /** Give back what the graphics card holds; the renderer stays. */
+  dispose() {
+    for (const scene of [this.scene, this.pickScene]) {
+      scene.traverse((thing) => {
+        thing.geometry?.dispose();
+        thing.material?.dispose();
+      });
+    }
+    for (const texture of [this.fixed, this.moved, this.state, this.pickTarget]) texture.dispose();
   }
 
   setState(part, visible, selected) {

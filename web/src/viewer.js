@@ -3,8 +3,9 @@
 import { Vector3 } from "three";
 import { PartList } from "./list.js";
 import { Marks } from "./marks.js";
-import { Orbit } from "./orbit.js";
+import { Orbit, VIEWS } from "./orbit.js";
 import { Stage } from "./stage.js";
+import { drawRamp, paper, said } from "./words.js";
 
 const PERIOD = 2.4; // seconds for one swing to and fro
 const TURN = 4.0; // seconds for one full turn
@@ -12,12 +13,6 @@ const STILL = window.matchMedia("(prefers-reduced-motion: reduce)");
 const DARK = window.matchMedia("(prefers-color-scheme: dark)");
 
 const byId = (id) => document.getElementById(id);
-
-function said(value) {
-  if (value === 0) return "0";
-  const size = Math.floor(Math.log10(Math.abs(value)));
-  return String(Number(value.toFixed(Math.max(0, 2 - size))));
-}
 
 export class Viewer {
   constructor(model) {
@@ -71,8 +66,7 @@ export class Viewer {
     const { clientWidth, clientHeight } = this.canvas.parentElement;
     this.stage.renderer.setSize(clientWidth, clientHeight, false);
     this.orbit.resize(clientWidth, clientHeight);
-    const paper = getComputedStyle(byId("stage")).backgroundColor.match(/[\d.]+/g).map(Number);
-    this.stage.uniforms.uPaper.value.set(paper[0] / 255, paper[1] / 255, paper[2] / 255);
+    this.stage.uniforms.uPaper.value.set(...paper(byId("stage")));
     this.wake();
   }
 
@@ -268,8 +262,7 @@ export class Viewer {
   }
 
   view(name) {
-    const views = { front: [0, 0, -1], side: [1, 0, 0], top: [0, -1, 0], iso: [0.497, -0.5, -0.709] };
-    return views[name] ?? this.model.contents.toward;
+    return name in VIEWS ? this.orbit.turned(VIEWS[name]).toArray() : this.model.contents.toward;
   }
 
   rows() {
@@ -295,16 +288,7 @@ export class Viewer {
   }
 
   legend() {
-    const canvas = byId("ramp");
-    const ink = canvas.getContext("2d");
-    const gradient = ink.createLinearGradient(0, 0, canvas.width, 0);
-    const stops = this.model.contents.ramp;
-    stops.forEach((stop, k) => {
-      const color = stop.map((value) => Math.round(255 * value)).join(",");
-      gradient.addColorStop(k / (stops.length - 1), `rgb(${color})`);
-    });
-    ink.fillStyle = gradient;
-    ink.fillRect(0, 0, canvas.width, canvas.height);
+    drawRamp(byId("ramp"), this.model.contents.ramp);
     byId("heat-most").textContent = `${said(100 * this.stage.most)} %`;
     byId("heat-middle").textContent = `${said(50 * this.stage.most)} %`;
   }

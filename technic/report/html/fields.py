@@ -81,11 +81,11 @@ def _bending(report: RigidityReport, mode: Mode, shapes: Shapes) -> tuple[Array,
     found = np.zeros((len(parts), len(POWERS), 3))
     for k, part in enumerate(parts):
         nodes = report.node_points.get(k)
-        if nodes is None or len(nodes) < 2:
+        if nodes is None or len(nodes) < 2 or k not in mode.displacements:
             continue
         nodes = np.asarray(nodes)
         local = part.pose.to_local(nodes) - part.mass_properties.centroid
-        whole = np.asarray(report.node_displacements[k]) / mode.value
+        whole = np.asarray(mode.displacements[k]) / mode.value
         found[k] = bending_of(
             local, nodes, whole, part.centroid, mode.twists[k] / mode.value, float(sizes[k])
         )
@@ -93,9 +93,9 @@ def _bending(report: RigidityReport, mode: Mode, shapes: Shapes) -> tuple[Array,
 
 
 def mode_fields(report: RigidityReport, drawing: Drawing, shapes: Shapes) -> list[Field]:
-    """Return the elastic modes at 1 N, the worst first; only that one has its parts' bending."""
+    """Return the elastic modes at 1 N, the worst first, parts bent where their nodes are known."""
     fields: list[Field] = []
-    for n, mode in enumerate(report.modes):
+    for mode in report.modes:
         if mode.value <= 0.0:
             continue
         twists = np.asarray(mode.twists) / mode.value
@@ -103,7 +103,7 @@ def mode_fields(report: RigidityReport, drawing: Drawing, shapes: Shapes) -> lis
         if furthest == 0.0:
             continue
         scale = deformation_scale(report, drawing, furthest)
-        if n == 0 and report.node_points:
+        if mode.displacements and report.node_points:
             bending, sizes = _bending(report, mode, shapes)
             fields.append(Field(twists, scale, bending, sizes))
         else:

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import io
-import json
-from functools import cache
-from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from technic.report.drawing import Drawing, drawing_of
 from technic.report.files import write_bytes
-from technic.report.html.pack import pack
+from technic.report.html.pack import Block, pack
+from technic.report.html.shell import embedded, render
 from technic.report.html.tables import (
     SPOT_ROWS,
     finding_groups,
@@ -28,64 +23,14 @@ from technic.report.worst_field import worst_field
 from technic.rigidity.result import RigidityReport, Verdict
 from technic.rigidity.serialize import size_mm
 
-if TYPE_CHECKING:
-    from jinja2 import Template
+__all__ = ["TONES", "facts", "page", "write_page"]
 
-__all__ = ["facts", "page", "write_page"]
-
-_PICTURE_WIDTH = 1280
-
-_TONES = {
+TONES = {
     Verdict.RIGID: "good",
     Verdict.FLEXIBLE: "bad",
     Verdict.DISCONNECTED: "bad",
     Verdict.UNDETERMINED: "warn",
 }
-
-
-def _asset(name: str) -> str:
-    return files("technic.report.html").joinpath("assets", name).read_text(encoding="utf-8")
-
-
-@cache
-def _template() -> Template:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    # Names in model files are anybody's: everything is escaped unless the template says otherwise.
-    environment = Environment(
-        loader=PackageLoader("technic.report.html"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("page.html.j2")
-
-
-def _hash(text: str) -> str:
-    """Return the source expression of the policy that admits exactly this text."""
-    digest = hashlib.sha256(text.encode("utf-8")).digest()
-    return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
-
-
-def _json(content: Any) -> str:
-    """Return JSON that may stand inside a script element: no letter that could end it."""
-    text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-
-
-def _embedded(picture: bytes) -> str:
-    """Return a PNG as a smaller picture in a data address."""
-    from PIL import Image
-
-    image = Image.open(io.BytesIO(picture)).convert("RGBA")
-    image = Image.alpha_composite(Image.new("RGBA", image.size, "white"), image).convert("RGB")
-    if image.width > _PICTURE_WIDTH:
-        height = round(image.height * _PICTURE_WIDTH / image.width)
-        image = image.resize((_PICTURE_WIDTH, height), Image.Resampling.LANCZOS)
-    stream = io.BytesIO()
-    image.save(stream, format="WEBP", quality=82, method=4)
-    return "data:image/webp;base64," + base64.b64encode(stream.getvalue()).decode("ascii")
 
 
 def facts(report: RigidityReport) -> list[tuple[str, str, str]]:
@@ -151,38 +96,26 @@ def page(
     str
         HTML that asks for nothing from outside.
     """
-    import technic
-
     contents: dict[str, Any] | None = None
-    block = ""
+    block = Block()
     if report.assembly.parts:
         drawing = drawing_of(report.assembly) if drawing is None else drawing
-        contents, block = pack(report, drawing, SPOT_ROWS)
+        contents = pack(report, drawing, block, spots=SPOT_ROWS)
     motions = [] if contents is None else contents["motions"]
     played = {entry["number"]: n for n, entry in enumerate(motions)}
-    style, script = _asset("page.css"), _asset("viewer.js")
-    scripts = _hash(script) if contents is not None else "'none'"
-    policy = (
-        f"default-src 'none'; script-src {scripts}; style-src {_hash(style)}; img-src data:; "
-        "base-uri 'none'; form-action 'none'"
-    )
-    return _template().render(
-        policy=policy,
-        style=style,
-        script=script,
-        licence=_asset("LICENSE.three.txt"),
-        version=technic.__version__,
+    return render(
+        "page.html.j2",
+        contents,
+        block.text(),
+        title=f"{report.assembly.name}: {report.verdict.value}",
         name=report.assembly.name,
-        tone=_TONES[report.verdict],
+        tone=TONES[report.verdict],
         verdict=report.verdict.value,
         reason=report.reason,
         facts=facts(report),
         softest=_softest(report),
         moves=report.mobility.total > report.mobility.idle,
-        picture=None if picture is None else _embedded(picture),
-        contents=contents,
-        contents_json=None if contents is None else _json(contents),
-        block=block,
+        picture=None if picture is None else embedded(picture),
         spots=spot_rows(report),
         spot_count=len(report.weak_spots),
         motions=motion_rows(report, played),
