@@ -15,9 +15,11 @@ from technic.commands.options import (
     AS_FOUND,
     JsonOption,
     ModelOptions,
+    PartModelOption,
     PictureOption,
     QuietOption,
 )
+from technic.commands.progress import progress_bar
 from technic.commands.reading import model_options, reading
 from technic.errors import UsageError
 
@@ -85,13 +87,6 @@ def _lengths(text: str | None) -> tuple[int, ...] | None:
         return tuple(int(word) for word in text.split(","))
     except ValueError as error:
         raise UsageError(f"--lengths is a list of numbers such as 5,7,9, not {text!r}") from error
-
-
-def _progress(stage: str, done: int, total: int) -> None:
-    if sys.stderr.isatty():
-        end = "\n" if done >= total else ""
-        sys.stderr.write(f"\r{stage} {done} of {total} {end}")
-        sys.stderr.flush()
 
 
 def _taken(answers: Sequence[Suggestions], rank: int, *, sequence: bool) -> list[Suggestion]:
@@ -212,6 +207,7 @@ def suggest(
     pair: Annotated[
         bool, typer.Option("--pair", help="With --apply: write it and its twin on the other side.")
     ] = False,
+    parts: PartModelOption = "solid",
     how: ModelOptions = AS_FOUND,
     quiet: QuietOption = False,
 ) -> None:
@@ -234,37 +230,37 @@ def suggest(
         raise UsageError("suggestions are made of LEGO parts: give an LDraw model (.ldr, .mpd)")
     options = reading(model, how)
     assembly = load(model, **options)
-    joining = {key: options[key] for key in ("axle_slide", "table") if key in options}
     wishes = _Wishes(
         between, box, lengths, straight, snug, inventory, max_parts, tuple(keep_out or ())
     )
     filters = _filters(assembly, wishes)
     sequence = count is not None or target is not None
-    if sequence:
-        answers = reinforce(
-            assembly,
-            steps=count or 100,
-            target=target,
-            filters=filters,
-            shortlist=shortlist,
-            rank=rank,
-            color=color,
-            **joining,
-            progress=_progress,
-        )
-    else:
-        answers = [
-            find(
+    with progress_bar() as tell:
+        if sequence:
+            answers = reinforce(
                 assembly,
-                count=top,
+                steps=count or 100,
+                target=target,
+                filters=filters,
                 shortlist=shortlist,
                 rank=rank,
-                filters=filters,
                 color=color,
-                **joining,
-                progress=_progress,
+                parts=parts,
+                progress=tell,
             )
-        ]
+        else:
+            answers = [
+                find(
+                    assembly,
+                    count=top,
+                    shortlist=shortlist,
+                    rank=rank,
+                    filters=filters,
+                    color=color,
+                    parts=parts,
+                    progress=tell,
+                )
+            ]
     chosen = _taken(answers, apply, sequence=sequence) if apply is not None else []
     if json is not None:
         from technic.report.suggest_json import suggestions_dict

@@ -13,13 +13,11 @@ from typing import Final
 
 import numpy as np
 
-from technic.assembly.model import Assembly, Joining, Part, Source
-from technic.assembly.stiffness import StiffnessTable, default_table
+from technic.assembly.model import Assembly, Part, Source
 from technic.design.candidates import Candidate
 from technic.design.sites import NEW
 from technic.errors import UsageError
 from technic.geometry import Pose, nearest_orthogonal
-from technic.ldraw.connect import AxleSlide
 from technic.ldraw.document import read
 from technic.ldraw.joining import rejoin
 from technic.ldraw.sections import document_from_text
@@ -91,13 +89,7 @@ def _as_written(part: NewPart) -> NewPart:
     return replace(part, pose=Pose(rotation, translation))
 
 
-def extend(
-    assembly: Assembly,
-    changes: Sequence[Change],
-    *,
-    axle_slide: AxleSlide = "held",
-    table: StiffnessTable | None = None,
-) -> Assembly:
+def extend(assembly: Assembly, changes: Sequence[Change]) -> Assembly:
     """Return the assembly with changes made, its connections found anew.
 
     Parameters
@@ -115,8 +107,6 @@ def extend(
         for new in change.added:
             number += 1
             parts.append(new_part(new, number, step))
-    if assembly.joining is None:
-        assembly = replace(assembly, joining=Joining(table or default_table(), axle_slide))
     return rejoin(assembly, parts)
 
 

@@ -13,15 +13,17 @@ from functools import lru_cache
 import numpy as np
 from scipy import linalg
 
+from technic.design.apply import HIGHLIGHT, new_part
 from technic.design.candidates import Attachment, Candidate, holes_of
 from technic.errors import UsageError
-from technic.fem.build import build_element
 from technic.fem.element import Element
-from technic.geometry import Array, readonly, shift_twist
+from technic.geometry import Array, Pose, readonly, shift_twist
+from technic.ldraw.write import NewPart
 from technic.parts.catalogue import catalogue
 from technic.parts.definition import PartDefinition
+from technic.system.part_models import FACTORIES, PartModel
 
-__all__ = ["Condensed", "Hold", "condensed", "hold_of", "own_modes"]
+__all__ = ["Condensed", "Hold", "condensed", "hold_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,12 +82,13 @@ def hold_of(candidate: Candidate, attachment: Attachment, old: PartDefinition | 
     return Hold(attachment.hole, (), fastening.pin, center, number, 1.5 * center)
 
 
-@lru_cache(maxsize=64)
-def _element(number: str) -> Element:
-    """Return a beam's element with a frame for each of its pin holes."""
-    definition = _definition(number)
-    points = np.array([definition.port(name).position for name in holes_of(number)])
-    return build_element(definition.body, definition.mass_properties, points)
+@lru_cache(maxsize=1024)
+def _element(number: str, holes: tuple[int, ...], parts: PartModel) -> Element:
+    """Return a beam's element with a frame for each of some of its pin holes."""
+    beam = new_part(NewPart(number, HIGHLIGHT, Pose(np.eye(3), np.zeros(3))), 1, 1)
+    names = tuple(holes_of(number)[hole] for hole in holes)
+    points = np.array([_definition(number).port(name).position for name in names])
+    return FACTORIES[parts](beam, points, names)
 
 
 def _definition(number: str) -> PartDefinition:
@@ -142,7 +145,9 @@ class _Matrices:
 
 
 @lru_cache(maxsize=4096)
-def condensed(number: str, holds: tuple[Hold, ...], pin: tuple[float, ...]) -> Condensed:
+def condensed(
+    number: str, holds: tuple[Hold, ...], pin: tuple[float, ...], parts: PartModel
+) -> Condensed:
     """Return a beam and its new pins, condensed.
 
     Parameters
@@ -152,6 +157,8 @@ def condensed(number: str, holds: tuple[Hold, ...], pin: tuple[float, ...]) -> C
     holds : tuple of Hold
     pin : tuple of float
         Stiffness of a pin in a hole [axial, shear, shear, spin, tilt, tilt].
+    parts : {"solid", "frame", "rigid"}
+        What the beam is made of; pins do not give way.
 
     Returns
     -------
@@ -159,37 +166,17 @@ def condensed(number: str, holds: tuple[Hold, ...], pin: tuple[float, ...]) -> C
         Places in the order of `holds`: each hole that a new pin enters, or the hole of the beam for
         the movement of a pin that is there already.
     """
-    m = _matrices(number, holds, pin)
+    m = _matrices(number, holds, pin, parts)
     follow = -linalg.solve(m.own, m.cross, assume_a="pos")
     stiffness = m.outer + m.cross.T @ follow
     inertia = m.heavy + follow.T @ m.inertia @ follow
     return Condensed((stiffness + stiffness.T) / 2, (inertia + inertia.T) / 2, m.mass)
 
 
-@lru_cache(maxsize=256)
-def own_modes(
-    number: str, holds: tuple[Hold, ...], pin: tuple[float, ...], count: int
-) -> tuple[Array, Array]:
-    """Return how a beam and its new pins vibrate when what holds them stands still.
-
-    Returns
-    -------
-    (count,) ndarray
-        Squares of the angular frequencies (1/s2), modes being of unit mass (kg).
-    (count, 6 places) ndarray
-        Inertia between each mode and the places, beside `Condensed.inertia`.
-    """
-    m = _matrices(number, holds, pin)
-    follow = -linalg.solve(m.own, m.cross, assume_a="pos")
-    # the softest of the many are wanted: the largest of the inverse problem
-    values, modes = linalg.eigh(m.inertia, m.own)
-    values, modes = values[::-1][:count], modes[:, ::-1][:, :count]
-    modes = modes / np.sqrt(values)
-    return 1.0 / values, modes.T @ m.inertia @ follow
-
-
-def _matrices(number: str, holds: tuple[Hold, ...], pin: tuple[float, ...]) -> _Matrices:
-    element = _element(number)
+def _matrices(
+    number: str, holds: tuple[Hold, ...], pin: tuple[float, ...], parts: PartModel
+) -> _Matrices:
+    element = _element(number, tuple(hold.hole for hold in holds), parts)
     n = element.stiffness.shape[0]
     new_pins = sum(bool(hold.bores) for hold in holds)
     places = sum(max(1, len(hold.bores)) for hold in holds)
@@ -201,8 +188,7 @@ def _matrices(number: str, holds: tuple[Hold, ...], pin: tuple[float, ...]) -> _
     heavy = np.zeros((6 * places, 6 * places))
     mass = _definition(number).mass_properties.mass
     place, body = 0, n
-    for hold in holds:
-        frame = element.frames[hold.hole]
+    for hold, frame in zip(holds, element.frames, strict=True):
         if not hold.bores:
             here = slice(6 * place, 6 * place + 6)
             spring = _spring(pin)

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from technic.assembly.model import Assembly, Joint, Part
-from technic.assembly.stiffness import StiffnessTable, default_table
+from technic.assembly.model import Assembly, Joining, Joint, Part
+from technic.assembly.stiffness import default_table
 from technic.design.apply import Change, new_part
 from technic.design.free_motions import all_motions
 from technic.design.lowest import lowest_eigenvalue
@@ -26,7 +26,7 @@ from technic.design.screen import Forecast
 from technic.fem.element import Element
 from technic.geometry import Array
 from technic.groups import connected_groups
-from technic.ldraw.connect import AxleSlide, link
+from technic.ldraw.connect import link
 from technic.ldraw.placed import collect
 from technic.parts.definition import RigidBody
 from technic.rigidity.eigen import elastic_modes
@@ -93,8 +93,6 @@ class Reanalysis:
         Read from an LDraw model.
     parts : {"solid", "frame", "rigid"}
         What parts are made of.
-    axle_slide : {"held", "free"}
-    table : StiffnessTable, optional
     """
 
     def __init__(
@@ -102,13 +100,10 @@ class Reanalysis:
         assembly: Assembly,
         *,
         parts: PartModel = "solid",
-        axle_slide: AxleSlide = "held",
-        table: StiffnessTable | None = None,
     ) -> None:
         self.assembly = assembly
         self._factory = FACTORIES[parts]
-        self._axle_slide: AxleSlide = axle_slide
-        self._table = table or default_table()
+        self._joining = assembly.joining or Joining(default_table())
         self._elements: dict[tuple[object, ...], Element] = {}
         self._neighbors: dict[int, Part] = {}
         self.system = assemble(assembly, element=self.element)
@@ -191,7 +186,8 @@ class Reanalysis:
         meets = ((self._low <= high) & (self._high >= low)).all(axis=1)
         near = [int(k) for k in np.flatnonzero(meets) if int(k) not in gone]
         present = [self.assembly.parts[k] for k in near]
-        joints = link([*present, *new], self._table, axle_slide=self._axle_slide).joints
+        how = self._joining
+        joints = link([*present, *new], how.table, axle_slide=how.axle_slide).joints
         count = len(self.assembly.parts)
         number = [*near, *range(count, count + len(new))]
         own = [j for j in joints if max(j.parts) >= len(near)]

@@ -5,13 +5,21 @@ from __future__ import annotations
 from dataclasses import replace
 
 from technic.assembly.model import Assembly
-from technic.assembly.stiffness import StiffnessTable
 from technic.design.apply import HIGHLIGHT
 from technic.design.filters import Filters, carried_over
-from technic.design.suggest import SHORTLIST, Progress, Rank, Suggestions, freedom, merit, suggest
-from technic.ldraw.connect import AxleSlide
+from technic.design.suggest import (
+    SHORTLIST,
+    Progress,
+    Rank,
+    Suggestions,
+    freedom,
+    merit,
+    suggest,
+    table_of,
+)
 from technic.rigidity.analyze import analyze
 from technic.rigidity.result import RigidityReport
+from technic.system.part_models import PartModel
 
 __all__ = ["reinforce"]
 
@@ -25,8 +33,7 @@ def reinforce(
     shortlist: int = SHORTLIST,
     rank: Rank = "ritz",
     color: int = HIGHLIGHT,
-    axle_slide: AxleSlide = "held",
-    table: StiffnessTable | None = None,
+    parts: PartModel = "solid",
     progress: Progress | None = None,
 ) -> list[Suggestions]:
     """Add the best beam again and again, the model analysed anew each time.
@@ -38,7 +45,7 @@ def reinforce(
         Most beams to add.
     target : float, optional
         Stop when the model is rigid, of one piece, and this stiff (N/m).
-    filters, shortlist, rank, color, axle_slide, table, progress
+    filters, shortlist, rank, color, parts, progress
         As for `suggest`; the inventory is used up on the way.
 
     Returns
@@ -53,7 +60,7 @@ def reinforce(
         As for `suggest`.
     """
     filters = filters or Filters()
-    before = analyze(assembly, modes=1)
+    before = analyze(assembly, modes=1, parts=parts, table=table_of(assembly))
     current = assembly
     done: list[Suggestions] = []
     for _ in range(steps):
@@ -67,8 +74,7 @@ def reinforce(
             filters=filters,
             pairs=False,
             color=color,
-            axle_slide=axle_slide,
-            table=table,
+            parts=parts,
             before=before,
             progress=progress,
         )

@@ -3,31 +3,29 @@
 The model's movements are taken as combinations of its motions that cost nothing and its lowest elastic
 modes. The new beam has its own unknowns, stiffness and mass; they follow from how its holes are held
 (`condense`). What is left for each candidate is an eigenvalue problem of the size of the combination,
-so a thousand candidates take a second.
-
-`Screen.refine` adds how the model gives way, statically, to loads at the very holes of one candidate,
-and the new beam's own modes: with these movements the forecast meets the re-analysis.
+so a thousand candidates take a second. The exact answer for one candidate is `reanalysis`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from scipy import linalg, sparse
-from scipy.sparse.linalg import splu
 
 from technic.assembly.model import Assembly
 from technic.assembly.stiffness import StiffnessTable, default_table
 from technic.design.candidates import Attachment, Candidate
-from technic.design.condense import Condensed, Hold, condensed, hold_of, own_modes
+from technic.design.condense import Condensed, Hold, condensed, hold_of
+from technic.design.free_motions import all_motions
 from technic.geometry import Array, shift_twist, turn_twist
 from technic.rigidity.eigen import elastic_modes
-from technic.rigidity.kinematics import component_motions, kinematics
+from technic.rigidity.kinematics import kinematics
 from technic.system.assemble import Probe, System, assemble
-from technic.system.inverse import ShiftedInverse, shifted_inverse, single_thread
+from technic.system.inverse import single_thread
+from technic.system.part_models import FACTORIES, PartModel
 
 __all__ = ["MODES", "Forecast", "Screen"]
 
@@ -40,13 +38,6 @@ _STRUCTURE: Final = 1e-3
 
 _RANK: Final = 1e-6
 """A motion is removed when the beam resists it with more than this share of a pin's shear stiffness."""
-
-_OWN: Final = 6
-"""Modes of the new beam by itself that a refined forecast takes in: a long beam on two holes may well
-be what vibrates first."""
-
-_SAME: Final = 1e-9
-"""Movements that add less than this (mean square, of unit ones) to the others add nothing."""
 
 Key = tuple[int, tuple[float, ...]]
 """A part and a place on it in the world (m)."""
@@ -77,6 +68,8 @@ class Screen:
     chosen : sequence of Candidate
         Everything that will be asked about.
     modes : int
+    parts : {"solid", "frame", "rigid"}
+        What parts are made of, new ones as well.
     table : StiffnessTable, optional
         Stiffness of pins in holes.
     """
@@ -87,10 +80,12 @@ class Screen:
         chosen: Sequence[Candidate],
         *,
         modes: int = MODES,
+        parts: PartModel = "solid",
         table: StiffnessTable | None = None,
     ) -> None:
         self._pin = tuple(float(v) for v in (table or default_table()).get("pin/pin_hole").vector())
         self._assembly = assembly
+        self._parts: PartModel = parts
         self._place: dict[Key, int] = {}
         probes: list[Probe] = []
         for candidate in chosen:
@@ -99,26 +94,22 @@ class Screen:
                     if key not in self._place:
                         self._place[key] = len(probes)
                         probes.append(Probe(key[0], np.array(key[1])))
-        system = assemble(assembly, probes=tuple(probes))
-        self._system = system
+        system = assemble(assembly, element=FACTORIES[parts], probes=tuple(probes))
         self.mass = system.mass
-        self._moving, twists, components = _motions(assembly, system)
+        moving, twists, components = _motions(assembly, system)
         elastic = system.elastic
         a = sparse.csr_array(system.A[elastic])
         joints = a.T @ sparse.diags_array(system.rows.stiffness[elastic]) @ a
-        self._stiffness = sparse.csr_array(system.K + joints)
-        self._held = sparse.csr_array(system.A[~elastic])
-        pairs = elastic_modes(self._stiffness, system.M, self._held, self._moving, modes)
-        kept = _moving_structure(assembly, system, self._moving, twists)
+        stiffness = sparse.csr_array(system.K + joints)
+        held = sparse.csr_array(system.A[~elastic])
+        pairs = elastic_modes(stiffness, system.M, held, moving, modes)
+        kept = _moving_structure(assembly, system, moving, twists)
         self.motions = kept.shape[1]
         self.values: Array = np.concatenate([np.zeros(self.motions), pairs.values])
         # motions of one connected whole take the beam along
         self._whole = 6 if components == 1 and not assembly.supports else 0
-        self._basis = np.column_stack([kept, pairs.vectors])
-        self._twists = np.asarray(system.probes @ self._basis).reshape(len(probes), 6, -1)
-        self._inverse: ShiftedInverse | None = None
-        self._project: Callable[[Array], Array] | None = None
-        self._gives: dict[Key, Array] = {}
+        basis = np.column_stack([kept, pairs.vectors])
+        self._twists = np.asarray(system.probes @ basis).reshape(len(probes), 6, -1)
 
     def forecasts(self, chosen: Sequence[Candidate]) -> list[Forecast]:
         """Return what each of some candidates would do."""
@@ -150,71 +141,6 @@ class Screen:
         if index >= len(values):
             return Forecast(removed, float("inf"))
         return Forecast(removed, float(values[index]) * (self.mass + change.mass))
-
-    def refine(self, candidate: Candidate) -> Forecast:
-        """Return what a candidate would do, with the model's static answer at its holes taken in."""
-        places = self._layout(candidate)
-        with single_thread():
-            extra = np.column_stack(
-                [self._give(key) for key in dict.fromkeys(k for k, _ in places)]
-            )
-            weight = self._system.M
-            extra = self._without_motions(extra)
-            for _ in range(2):  # once more against rounding
-                extra = extra - self._basis @ (self._basis.T @ (weight @ extra))
-            gram = extra.T @ (weight @ extra)
-            size = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
-            values, mix = np.linalg.eigh(size[:, None] * gram * size)
-            good = values > _SAME
-            extra = extra @ (size[:, None] * mix[:, good] / np.sqrt(values[good]))
-            basis = np.column_stack([self._basis, extra])
-            change = self._condensed(candidate)
-            twists = np.asarray(self._system.probes[self._rows(places)] @ basis)
-            field = self._turned(candidate, places, twists.reshape(len(places), 6, -1))
-            own = field.T @ change.stiffness @ field
-            removed = self._removed(own, field)
-            count, size = self._basis.shape[1], basis.shape[1]
-            stiffness = np.zeros((size + _OWN, size + _OWN))
-            stiffness[:size, :size] = own
-            stiffness[range(count), range(count)] += self.values
-            crossed = basis.T @ (self._stiffness @ extra)
-            stiffness[:size, count:size] += crossed
-            stiffness[count:size, :count] += crossed[:count].T
-            inertia = np.zeros_like(stiffness)
-            inertia[:size, :size] = field.T @ change.inertia @ field + self.mass * np.eye(size)
-            squares, coupling = own_modes(candidate.number, self._holds(candidate), self._pin, _OWN)
-            stiffness[range(size, size + _OWN), range(size, size + _OWN)] = squares
-            inertia[range(size, size + _OWN), range(size, size + _OWN)] = 1.0
-            inertia[size:, :size] = coupling @ field
-            inertia[:size, size:] = inertia[size:, :size].T
-            found = linalg.eigvalsh((stiffness + stiffness.T) / 2, inertia, check_finite=False)
-        return self._lowest(found, removed, change)
-
-    def _without_motions(self, movements: Array) -> Array:
-        """Take out what costs nothing, pins that turn in place included."""
-        weight = self._system.M
-        if self._project is None:
-            gram = sparse.csc_array(self._moving.T @ (weight @ self._moving))
-            self._project = splu(gram).solve
-        share = self._project(self._moving.T @ (weight @ movements))
-        return np.asarray(movements - self._moving @ share)
-
-    def _rows(self, places: list[tuple[Key, Array]]) -> Array:
-        first = np.array([6 * self._place[key] for key, _ in places])
-        return np.asarray((first[:, None] + np.arange(6)).ravel())
-
-    def _give(self, key: Key) -> Array:
-        """Return how the model gives way to unit loads at a place, (n, 6)."""
-        if key not in self._gives:
-            if self._inverse is None:
-                shift = max(float(self.values[self.motions :].min(initial=1.0)), 1e-3)
-                self._inverse = shifted_inverse(
-                    self._stiffness, self._system.M, self._held, self._moving, shift
-                )
-            first = 6 * self._place[key]
-            loads = self._system.probes[first : first + 6].toarray()
-            self._gives[key] = np.column_stack([self._inverse.solve(load) for load in loads])
-        return self._gives[key]
 
     def projections(self, chosen: Sequence[Candidate]) -> list[float]:
         """Return the paper's heuristic for each candidate.
@@ -272,7 +198,7 @@ class Screen:
         return float(field @ self._condensed(candidate).stiffness @ field) / 2.0
 
     def _condensed(self, candidate: Candidate) -> Condensed:
-        return condensed(candidate.number, self._holds(candidate), self._pin)
+        return condensed(candidate.number, self._holds(candidate), self._pin, self._parts)
 
     def _holds(self, candidate: Candidate) -> tuple[Hold, ...]:
         holds: list[Hold] = []
@@ -326,18 +252,13 @@ def _motions(assembly: Assembly, system: System) -> tuple[sparse.csc_array, spar
     number of connected components.
     """
     kin = kinematics(assembly)
-    columns = []
-    for component in range(len(kin.components)):
-        motions = component_motions(kin, component)
-        rows = np.concatenate([np.arange(6 * p, 6 * p + 6) for p in motions.parts])
-        spread = sparse.csr_array(
-            (np.ones(len(rows)), (rows, np.arange(len(rows)))),
-            shape=(6 * len(assembly.parts), len(rows)),
-        )
-        columns.append(spread @ motions.twists)
-    twists = sparse.csr_array(sparse.hstack(columns))
+    twists = all_motions(kin)
     scale = sparse.diags_array(np.tile(kin.units, len(assembly.parts)))
-    return sparse.csc_array(system.R @ (scale @ twists)), twists, len(kin.components)
+    return (
+        sparse.csc_array(system.R @ (scale @ twists)),
+        sparse.csr_array(twists),
+        len(kin.components),
+    )
 
 
 def _moving_structure(

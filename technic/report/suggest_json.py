@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any
 
+from technic.design.confidence import Confidence
 from technic.design.filters import needs
 from technic.design.suggest import Suggestion, Suggestions
 from technic.ldraw.write import NewPart
@@ -76,6 +77,18 @@ def _new_part(part: NewPart) -> dict[str, Any]:
     }
 
 
+def _confidence(sure: Confidence | None) -> dict[str, Any] | None:
+    if sure is None:
+        return None
+    return {
+        "basis": sure.basis,
+        "interval_95": list(sure.interval_95),
+        "factor_95": None if sure.factor_95 is None else list(sure.factor_95),
+        "probability_it_helps": sure.helps,
+        "probability_it_beats_the_next": sure.beats_next,
+    }
+
+
 def _suggestion(before: RigidityReport, suggestion: Suggestion, rank: int) -> dict[str, Any]:
     parts = before.assembly.parts
     candidate = suggestion.candidate
@@ -101,14 +114,9 @@ def _suggestion(before: RigidityReport, suggestion: Suggestion, rank: int) -> di
         "needs": dict(needs(candidate)),
         "cures": cure_words(before, suggestion),
         "predicted_n_per_m": forecast if isfinite(forecast) else None,
-        "refined_n_per_m": suggestion.refined.rigidity
-        if isfinite(suggestion.refined.rigidity)
-        else None,
         "predicted_motions_removed": suggestion.forecast.removed,
         "reanalyzed_n_per_m": None if after.rigidity is None else after.rigidity.value,
-        "interval_95": None
-        if after.rigidity is None or after.rigidity.interval_95 is None
-        else list(after.rigidity.interval_95),
+        "confidence": _confidence(suggestion.confidence),
         "factor": suggestion.factor,
         "after": _state(after),
         "twins": suggestion.twins,

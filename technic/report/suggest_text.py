@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from technic.assembly.model import Assembly
 from technic.design.candidates import Attachment, describe_fit
+from technic.design.confidence import FACTOR
 from technic.design.filters import needs
 from technic.design.suggest import Suggestion, Suggestions
 from technic.parts.catalogue import catalogue
@@ -15,7 +16,17 @@ from technic.report.wording import count, joined, number, part_name, place, spot
 from technic.rigidity.result import RigidityReport, Verdict
 from technic.units import LDU
 
-__all__ = ["alternatives_text", "cure_words", "hole_words", "parts_words", "sequence_text"]
+__all__ = [
+    "alternatives_text",
+    "basis_words",
+    "cure_words",
+    "hole_words",
+    "nothing_words",
+    "parts_words",
+    "sequence_text",
+    "sure_words",
+    "unseen_words",
+]
 
 _SIDES = {
     "+x": "from the right",
@@ -112,6 +123,8 @@ def _suggestion(before: RigidityReport, suggestion: Suggestion, style: Style) ->
             twin = joined([_coordinates(a.point) for a in suggestion.pair.candidate.attachments])
             said += f"; with a second one, holes at {twin}: {_state(suggestion.pair.report)}"
         lines += style.wrap(f"{said}.", "   ")
+    if sure := sure_words(suggestion):
+        lines += style.wrap(sure, "   ")
     return lines
 
 
@@ -123,7 +136,8 @@ def _head(answer: Suggestions, style: Style) -> list[str]:
     ]
 
 
-def _none(answer: Suggestions, style: Style) -> list[str]:
+def nothing_words(answer: Suggestions) -> str:
+    """Return why nothing was suggested."""
     if not answer.places:
         why = (
             "no two free holes, or pins that a longer one could replace, lie so that a beam would tie "
@@ -134,11 +148,11 @@ def _none(answer: Suggestions, style: Style) -> list[str]:
         why = f"none of {count(answer.places, 'place')} can be built: {why}"
     else:
         why = f"none of {count(answer.places, 'place')} makes the model more rigid"
-    return style.wrap(f"Nothing fits: {why}.")
+    return f"Nothing fits: {why}."
 
 
-def _unseen(answer: Suggestions, style: Style) -> list[str]:
-    """Say what the search for collisions did not see."""
+def unseen_words(answer: Suggestions) -> str:
+    """Say what the search for collisions did not see; "" when it saw all."""
     parts = answer.before.assembly.parts
     said = []
     if answer.unseen:
@@ -148,20 +162,44 @@ def _unseen(answer: Suggestions, style: Style) -> list[str]:
     unknown = sum(part.count for part in answer.before.assembly.unknown)
     if unknown:
         said.append(f"{count(unknown, 'unknown part')}")
-    if not said:
-        return []
-    return style.wrap(f"Not checked: whether {joined(said)} would be in the way.")
+    return f"Not checked: whether {joined(said)} would be in the way." if said else ""
 
 
-def _how_sure(report: RigidityReport, style: Style) -> list[str]:
-    rigidity = report.rigidity
-    if rigidity is None or rigidity.interval_95 is None:
-        return style.wrap(
-            "How sure: verdicts and motions do not depend on stiffnesses; N/m do, and the joints' "
-            "stiffnesses are not calibrated."
+def _unseen(answer: Suggestions, style: Style) -> list[str]:
+    said = unseen_words(answer)
+    return style.wrap(said) if said else []
+
+
+def sure_words(suggestion: Suggestion) -> str:
+    """Return how sure the numbers of a suggestion are, in words."""
+    sure = suggestion.confidence
+    if sure is None:
+        return ""
+    low, high = (number(v) for v in sure.interval_95)
+    said = f"95 %: {low} to {high} N/m"
+    if sure.factor_95 is not None:
+        low, high = (number(v) for v in sure.factor_95)
+        said += f", {low} to {high} times as rigid as now"
+    if sure.beats_next is not None:
+        said += f"; better than the next one with a probability of {100 * sure.beats_next:.0f} %"
+    return f"How sure: {said}."
+
+
+def basis_words(suggestions: Sequence[Suggestion]) -> str:
+    """Say what the intervals rest on."""
+    bases = {s.confidence.basis for s in suggestions if s.confidence is not None}
+    if "calibration" in bases:
+        return (
+            "Verdicts and motions do not depend on stiffnesses. The intervals are those of the "
+            "calibrated joint stiffnesses; parts, and joints that were not measured, are taken as exact."
         )
-    low, high = rigidity.interval_95
-    return style.wrap(f"How sure: 95 % between {number(low)} and {number(high)} N/m.")
+    said = "Verdicts and motions do not depend on stiffnesses; N/m do."
+    if bases:
+        said += (
+            " The joints' stiffnesses are not calibrated: the intervals assume that each is known "
+            f"within a factor of {FACTOR:g}."
+        )
+    return said
 
 
 def alternatives_text(answer: Suggestions, style: Style | None = None) -> str:
@@ -169,12 +207,12 @@ def alternatives_text(answer: Suggestions, style: Style | None = None) -> str:
     style = Style() if style is None else style
     lines = _head(answer, style)
     if not answer.suggestions:
-        lines += ["", *_none(answer, style)]
+        lines += ["", *style.wrap(nothing_words(answer))]
         return "\n".join(lines) + "\n"
     lines += ["", f"One part, best first (of {count(answer.places, 'place')}):"]
     for suggestion in answer.suggestions:
         lines += ["", *_suggestion(answer.before, suggestion, style)]
-    lines += ["", *_unseen(answer, style), *_how_sure(answer.suggestions[0].report, style)]
+    lines += ["", *_unseen(answer, style), *style.wrap(basis_words(answer.suggestions))]
     return "\n".join(lines) + "\n"
 
 
@@ -190,13 +228,13 @@ def sequence_text(answers: Sequence[Suggestions], style: Style | None = None) ->
         lines += ["", *_suggestion(answer.before, answer.suggestions[0], style)]
         total.update(needs(answer.suggestions[0].candidate))
     if len(taken) < len(answers):
-        lines += ["", *_none(answers[-1], style)]
+        lines += ["", *style.wrap(nothing_words(answers[-1]))]
     if taken:
         last = taken[-1].suggestions[0].report
         lines += ["", *style.wrap(f"In the end: {_state(last)}.{_gain(answers[0].before, last)}")]
         said = joined([f"{n} x {part}" for part, n in sorted(total.items())])
         lines += [*style.wrap(f"Parts: {said}."), *_unseen(answers[0], style)]
-        lines += _how_sure(last, style)
+        lines += style.wrap(basis_words([a.suggestions[0] for a in taken]))
     return "\n".join(lines) + "\n"
 
 

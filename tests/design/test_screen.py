@@ -43,19 +43,15 @@ def test_forecasts_put_candidates_in_the_exact_order(model, name, lengths, bent)
     assert len(found) > 30
     screen = Screen(assembly, found)
     forecasts = screen.forecasts(found)
-    refined = [screen.refine(c) for c in found]
     reports = [analyze(extend(assembly, [change_of(assembly, c)]), modes=1) for c in found]
     removed = [moving(before) - moving(r) for r in reports]
     exact = np.array([r.rigidity.value for r in reports])
     assert [f.removed for f in forecasts] == removed
-    assert [f.removed for f in refined] == removed
     truth = order(removed, exact)
     guess = order(removed, [f.rigidity for f in forecasts])
     assert spearmanr(guess, truth)[0] >= 0.9
     best = np.flatnonzero(truth >= truth.max() * (1 - 1e-9))  # twins are equal
     assert min(list(np.argsort(-guess, kind="stable")).index(k) for k in best) < 10
-    # the refined forecast differs by its finer mesh only
-    assert np.allclose([f.rigidity for f in refined], exact, rtol=0.02)
     # the paper's heuristic beside it (benchmarks/suggest.py prints both)
     assert spearmanr(screen.projections(found), truth)[0] < spearmanr(guess, truth)[0]
 
@@ -72,7 +68,6 @@ def test_more_modes_never_raise_the_forecast(model):
     found = candidates(assembly)[::9]
     few = Screen(assembly, found, modes=5)
     many = Screen(assembly, found, modes=40)
-    for candidate, a, b in zip(found, few.forecasts(found), many.forecasts(found), strict=True):
+    for a, b in zip(few.forecasts(found), many.forecasts(found), strict=True):
         assert a.removed == b.removed
         assert b.rigidity <= a.rigidity * (1 + 1e-9)
-        assert many.refine(candidate).rigidity <= b.rigidity * (1 + 1e-6)
