@@ -25,7 +25,7 @@ from technic.parts.definition import (
 )
 from technic.parts.materials import MIXED, SOFT, material_of, materials
 
-__all__ = ["apply_materials", "known_material", "material_in", "parse_materials"]
+__all__ = ["apply_materials", "known_material", "material_in", "parse_materials", "plain_parts"]
 
 _FIELDS: Final = {"young_gpa", "poisson", "density"}
 
@@ -92,13 +92,16 @@ def parse_materials(assembly: Assembly, texts: Iterable[str]) -> dict[int, Mater
         if equals:
             chosen.update(dict.fromkeys(find_parts(assembly, who), made_of))
         else:
-            plain = (k for k, part in enumerate(assembly.parts) if _plain(part))
-            general = dict.fromkeys(plain, made_of)
+            general = dict.fromkeys(plain_parts(assembly), made_of)
     return general | chosen
 
 
+def plain_parts(assembly: Assembly) -> list[int]:
+    """Return the parts that are of one hard plastic."""
+    return [k for k, part in enumerate(assembly.parts) if _plain(part)]
+
+
 def _plain(part: Part) -> bool:
-    """Tell whether a part is of one hard plastic."""
     made_of = material_in(part)
     if made_of is None or made_of.name in SOFT:
         return False

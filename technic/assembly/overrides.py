@@ -24,6 +24,10 @@ end of an id, or by a part number that the model has once. ::
 
     [[weld]]                    # parts that are one piece
     parts = ["20:3001", "21:3001", "22:3001"]
+
+    [[material]]                # what a part, or every part of a number, is made of; without `part`: all
+    part = "3705"
+    material = "PC"             # or { young_gpa = 2.4, poisson = 0.37, density = 1200 }
 """
 
 from __future__ import annotations
@@ -39,11 +43,13 @@ from typing import Any, Final
 import numpy as np
 
 from technic.assembly.joint_types import HELD, MOTION_NAMES, JointType
+from technic.assembly.materials import apply_materials, known_material, plain_parts
 from technic.assembly.model import Assembly, Finding, FindingKind, Joint
-from technic.assembly.select import find_part
+from technic.assembly.select import find_part, find_parts
 from technic.assembly.typed_joints import AxisFault, joint_axes, stiffness_of
 from technic.errors import InputError, SchemaError, UsageError
 from technic.geometry import Array, axes_from, readonly
+from technic.parts.definition import Material
 from technic.units import LDU
 
 __all__ = ["SCHEMA", "apply_overrides", "by_user", "read_overrides"]
@@ -65,6 +71,7 @@ _KEYS: Final[dict[str, frozenset[str]]] = {
     "retype": frozenset({"parts", "joint", "type", "axis", "axis2", "stiffness"}),
     "add": frozenset({"parts", "type", "point", "axis", "axis2", "stiffness"}),
     "weld": frozenset({"parts"}),
+    "material": frozenset({"part", "material"}),
 }
 
 _FILE: Final = "overrides file"
@@ -170,11 +177,14 @@ class _Change:
         self.joints = list(assembly.joints)
         self.ignored: set[int] = set()
         self.findings: list[Finding] = []
+        self.made_of: dict[int, Material] = {}
         self.done: dict[str, list[dict[str, Any]]] = {table: [] for table in _KEYS}
 
     def named(self, row: Mapping[str, Any]) -> dict[str, Any]:
         """Return an entry with its parts named by their ids, which stay when other parts come."""
         named = dict(row)
+        if "material" in row:
+            return named  # it may be for every part of a number, those to come too
         ids = [part.id for part in self.assembly.parts]
         if "parts" in row:
             named["parts"] = [ids[find_part(self.assembly, name)] for name in row["parts"]]
@@ -256,16 +266,32 @@ class _Change:
             )
         self._note(f"{len(parts)} parts are one piece", parts)
 
+    def material(self, row: Mapping[str, Any]) -> None:
+        try:
+            made_of = known_material(row.get("material"))
+        except InputError as fault:
+            raise _Fault("material", fault.message) from None
+        if "part" not in row:
+            self.made_of = dict.fromkeys(plain_parts(self.assembly), made_of) | self.made_of
+            return
+        if not isinstance(row["part"], str):
+            raise _Fault("part", "expected the name of a part")
+        try:
+            self.made_of |= dict.fromkeys(find_parts(self.assembly, row["part"]), made_of)
+        except UsageError as fault:
+            raise _Fault("part", str(fault)) from None
+
     def result(self) -> Assembly:
         """Return the corrected assembly."""
         done = {"schema": SCHEMA} | {table: rows for table, rows in self.done.items() if rows}
         joining = self.assembly.joining
-        return replace(
+        corrected = replace(
             self.assembly,
             joints=tuple(self.joints),
             findings=(*self.assembly.findings, *self.findings),
             joining=None if joining is None else replace(joining, corrections=done),
         )
+        return apply_materials(corrected, self.made_of)
 
     # --- pieces of entries ----------------------------------------------------------------------
     def _note(self, what: str, parts: tuple[int, ...]) -> None:
