@@ -18,10 +18,11 @@ from technic.commands.options import (
     PartModelOption,
     PictureOption,
     QuietOption,
+    ReportOption,
 )
 from technic.commands.progress import progress_bar
 from technic.commands.reading import model_options, reading
-from technic.errors import UsageError
+from technic.errors import MissingDependency, UsageError
 
 if TYPE_CHECKING:
     from technic.assembly.model import Assembly
@@ -127,6 +128,28 @@ def _draw(
         painter.close()
 
 
+def _page(answers: Sequence[Suggestions], path: Path, *, sequence: bool) -> None:
+    """Write the page with before and after, its picture left out on a machine that cannot draw."""
+    from technic.report.comparison import comparison_scene
+    from technic.report.html.suggestions import write_suggestions_page
+    from technic.report.render import Painter
+
+    if not answers:
+        raise UsageError("no page was written: the model is as rigid as demanded")
+    taken = [answer.suggestions[0] for answer in answers if answer.suggestions]
+    picture = None
+    if taken:
+        reports = [answers[0].before, taken[-1].report]
+        painter = Painter()
+        try:
+            picture = painter.picture(comparison_scene(reports, ["before", "after"]))
+        except MissingDependency as error:
+            typer.echo(f"technic: the page is without a picture: {error}", err=True)
+        finally:
+            painter.close()
+    write_suggestions_page(answers, path, sequence=sequence, picture=picture)
+
+
 @model_options
 def suggest(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="LDraw file (.ldr, .mpd).")],
@@ -195,6 +218,7 @@ def suggest(
         Path | None, typer.Option("--out", metavar="FILE", help="Where --apply writes.")
     ] = None,
     picture: PictureOption = None,
+    report: ReportOption = None,
     parts_list: Annotated[
         Path | None,
         typer.Option(
@@ -223,7 +247,13 @@ def suggest(
 
     if (apply is None) != (out is None):
         raise UsageError("--apply RANK and --out FILE go together")
-    for path in (out, picture, parts_list, Path(json) if json not in (None, STDOUT) else None):
+    for path in (
+        out,
+        picture,
+        report,
+        parts_list,
+        Path(json) if json not in (None, STDOUT) else None,
+    ):
         if path is not None:
             check_writable(path)
     if model.suffix.lower() == ".json":
@@ -278,6 +308,8 @@ def suggest(
         write_reinforced(model, out, assembly, _changes(chosen, pair=pair))
     if picture is not None:
         _draw(answers, chosen, picture, pair=pair)
+    if report is not None:
+        _page(answers, report, sequence=sequence)
     if parts_list is not None:
         every = [s for a in answers for s in (a.suggestions if sequence else a.suggestions[:1])]
         total: Counter[str] = Counter()
