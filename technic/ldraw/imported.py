@@ -1,8 +1,7 @@
 """Definitions of parts that the catalogue does not have, made from an LDraw library.
 
 A definition so made has ports and a drawing, from which an analysis can make a solid model; by itself
-it is a rigid body. Its mass comes from its surface, where that is closed
-well enough, else from its box. What was estimated is said in `PartDefinition.source`.
+it is a rigid body. Where its ports and its mass come from is said in `PartDefinition.source`.
 """
 
 from __future__ import annotations
@@ -22,34 +21,25 @@ from technic.ldraw.shadow import ShadowLibrary
 from technic.ldraw.shadow_ports import ports_from_shadow
 from technic.ldraw.triangles import Surface, surface_of
 from technic.ldraw.undersides import stud_places
+from technic.ldraw.weight import mass_of
 from technic.parts.definition import (
     LIBRARY_FAMILY,
     Drawing,
-    MassProperties,
     PartDefinition,
     Port,
     PortKind,
     RigidBody,
 )
 from technic.parts.inner import inner_parts
-from technic.parts.materials import material
 from technic.units import MM, PITCH
 
-__all__ = ["CELLS", "Solids", "definition_from_library", "is_fastener", "mass_of"]
+__all__ = ["CELLS", "Solids", "definition_from_library", "is_fastener"]
 
 Solids = Literal["draft", "fine", "off"]
 
 CELLS: Final[dict[str, float]] = {"draft": 1.6 * MM, "fine": 0.8 * MM}
 """Edge of the cells that a part of the library is meshed with, by setting (m); fine is the setting of
 the models that are shipped."""
-
-CLOSED: Final = 0.03
-"""Largest gap of a surface (see `SurfaceIntegrals`) whose enclosed volume is trusted: of 244 Technic
-parts 224 are below, most of them below 1e-3."""
-
-FILL: Final = 0.32
-"""Share of its box that a part fills: the median of those 224 parts (10th to 90th percentile 0.17 to
-0.53)."""
 
 BUSH_SIZE: Final = 1.2 * PITCH
 """Largest size of a bush: 1L and its flanges."""
@@ -132,40 +122,6 @@ def _triangles(library: Library, number: str, *, fine: bool) -> Array:
 def _title(text: str) -> str:
     """Return the title of a part without marks of the library (``~ = _ |``) and double spaces."""
     return re.sub(r"\s+", " ", text.lstrip("~=_|")).strip()
-
-
-def mass_of(surface: Surface) -> tuple[MassProperties, str]:
-    """Return mass properties of a part of ABS, and how they were found.
-
-    Parameters
-    ----------
-    surface : Surface
-
-    Returns
-    -------
-    MassProperties
-        Zero mass when there is no surface (a part file that draws nothing).
-    str
-        Half a sentence for `PartDefinition.source`.
-    """
-    if not len(surface.triangles):
-        zero = MassProperties(0.0, np.zeros(3), np.zeros((3, 3)))
-        return zero, "no surface, no mass"
-    density = material().density
-    low, high = surface.bounds
-    box = float(np.prod(high - low))
-    integrals = surface.integrals()
-    volume, centroid = integrals.volume, integrals.centroid
-    inside = bool(((centroid >= low) & (centroid <= high)).all())
-    if integrals.gap <= CLOSED and 0.0 < volume <= box and inside:
-        moments = integrals.second_moments - volume * np.outer(centroid, centroid)
-        inertia = density * (np.trace(moments) * np.eye(3) - moments)
-        if np.linalg.eigvalsh(inertia)[0] > 0.0:
-            return MassProperties(density * volume, centroid, inertia), "mass from the surface"
-    size = np.maximum(high - low, 1e-6)
-    mass = density * FILL * float(np.prod(size))
-    inertia = np.diag(mass / 12.0 * (size @ size - size**2))
-    return MassProperties(mass, (low + high) / 2.0, inertia), "mass estimated from the box"
 
 
 def is_fastener(ports: Sequence[Port], title: str, surface: Surface) -> bool:
