@@ -18,6 +18,7 @@ import typer
 from technic import __version__
 from technic.commands import (
     analyze,
+    batch,
     calibrate,
     deflect,
     demo,
@@ -43,6 +44,7 @@ app = typer.Typer(
 )
 app.command("analyze")(analyze.analyze)
 app.command("deflect")(deflect.deflect)
+app.command("batch")(batch.batch)
 app.command("calibrate")(calibrate.calibrate)
 app.command("demo")(demo.demo)
 app.command("doctor")(doctor.doctor)

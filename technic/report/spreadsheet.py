@@ -18,7 +18,7 @@ from technic.rigidity.result import RigidityReport
 from technic.rigidity.serialize import joint_stiffness, spot_place, unit_load
 from technic.units import MM
 
-__all__ = ["tables", "write_tables"]
+__all__ = ["csv_text", "tables", "write_tables"]
 
 Table = list[list[Any]]
 
@@ -147,7 +147,8 @@ def tables(report: RigidityReport) -> dict[str, Table]:
     }
 
 
-def _text(table: Sequence[Sequence[Any]]) -> str:
+def csv_text(table: Sequence[Sequence[Any]]) -> str:
+    """Return a table as CSV; text that a spreadsheet would take for a formula is marked as text."""
     stream = io.StringIO()
     writer = csv.writer(stream)
     writer.writerows([_plain(value) for value in row] for row in table)
@@ -168,4 +169,4 @@ def write_tables(report: RigidityReport, directory: Path) -> None:
         raise UsageError(f"{directory} cannot be made a directory: {error.strerror}") from error
     for name, table in tables(report).items():
         # The mark at the start tells spreadsheets that it is UTF-8.
-        write_bytes(directory / f"{name}.csv", _text(table).encode("utf-8-sig"))
+        write_bytes(directory / f"{name}.csv", csv_text(table).encode("utf-8-sig"))
