@@ -112,6 +112,10 @@ DRIVEN_MOTION: Final = 1e-6
 STATIC_RESIDUAL: Final = 1e-10
 """The static solution has converged when the last step of refinement is this small beside the whole."""
 
+LARGE_TURN: Final = 0.1
+"""Rotation of a part (rad) above which a static answer warns: what linear mechanics leaves out is of the
+order of half its square, 0.5 % there."""
+
 LATTICE_POINT: Final = 1e-3
 """A point lies on the lattice when it is this close (LDU): exports of editors are off by 1e-4, and a tenth
 of an LDU is the finest step that a model on the grid uses."""

@@ -25,7 +25,7 @@ from technic.parts.definition import (
 )
 from technic.parts.materials import MIXED, SOFT, material_of, materials
 
-__all__ = ["apply_materials", "known_material", "material_in", "parse_materials", "plain_parts"]
+__all__ = ["apply_materials", "known_material", "material_in", "parse_materials", "plastic_parts"]
 
 _FIELDS: Final = {"young_gpa", "poisson", "density"}
 
@@ -92,11 +92,11 @@ def parse_materials(assembly: Assembly, texts: Iterable[str]) -> dict[int, Mater
         if equals:
             chosen.update(dict.fromkeys(find_parts(assembly, who), made_of))
         else:
-            general = dict.fromkeys(plain_parts(assembly), made_of)
+            general = dict.fromkeys(plastic_parts(assembly), made_of)
     return general | chosen
 
 
-def plain_parts(assembly: Assembly) -> list[int]:
+def plastic_parts(assembly: Assembly) -> list[int]:
     """Return the parts that are of one hard plastic."""
     return [k for k, part in enumerate(assembly.parts) if _plain(part)]
 

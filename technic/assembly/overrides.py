@@ -43,7 +43,7 @@ from typing import Any, Final
 import numpy as np
 
 from technic.assembly.joint_types import HELD, MOTION_NAMES, JointType
-from technic.assembly.materials import apply_materials, known_material, plain_parts
+from technic.assembly.materials import apply_materials, known_material, plastic_parts
 from technic.assembly.model import Assembly, Finding, FindingKind, Joint
 from technic.assembly.select import find_part, find_parts
 from technic.assembly.typed_joints import AxisFault, joint_axes, stiffness_of
@@ -272,7 +272,7 @@ class _Change:
         except InputError as fault:
             raise _Fault("material", fault.message) from None
         if "part" not in row:
-            self.made_of = dict.fromkeys(plain_parts(self.assembly), made_of) | self.made_of
+            self.made_of = dict.fromkeys(plastic_parts(self.assembly), made_of) | self.made_of
             return
         if not isinstance(row["part"], str):
             raise _Fault("part", "expected the name of a part")

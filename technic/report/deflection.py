@@ -21,6 +21,7 @@ from technic.rigidity.serialize import joint_stiffness
 from technic.statics.solve import Deflection, Load
 from technic.system.assemble import Probe
 from technic.system.part_models import PlainPart
+from technic.tolerances import LARGE_TURN
 from technic.units import MM
 
 __all__ = ["SCHEMA", "StaticCase", "deflection_dict", "deflection_text"]
@@ -52,6 +53,8 @@ class StaticCase:
         How many parts were modelled as "solid", "frame" and "rigid".
     plain_parts : tuple of PlainPart
         The kinds of part without a solid model, when solid models were asked for.
+    rigid_walls : Deflection or None
+        The same with bores that keep their shape, the least that it can sag; None when not asked for.
     """
 
     deflection: Deflection
@@ -61,16 +64,33 @@ class StaticCase:
     intervals: tuple[tuple[float, float] | None, ...] = ()
     part_models: Mapping[str, int] = field(default_factory=dict)
     plain_parts: tuple[PlainPart, ...] = ()
+    rigid_walls: Deflection | None = None
 
     @property
     def assembly(self) -> Assembly:
         """The assembly under load."""
         return self.deflection.system.assembly
 
+    def stiffest_mm(self, k: int) -> float | None:
+        """Return how far the k-th point goes (mm) when bores keep their shape; None if not asked for."""
+        if self.rigid_walls is None:
+            return None
+        return float(np.linalg.norm(self.rigid_walls.probe_twists[k, :3])) / MM
+
     def interval_mm(self, k: int) -> list[float] | None:
         """Return the 95 % interval (mm) of how far the k-th point goes; None when it is not known."""
         found = self.intervals[k] if self.intervals else None
         return None if found is None else [found[0] / MM, found[1] / MM]
+
+
+def _warnings(case: StaticCase) -> list[str]:
+    """Return why the numbers are not to be believed, one sentence each."""
+    turn = float(np.linalg.norm(case.deflection.part_twists[:, 3:], axis=1).max(initial=0.0))
+    if turn <= LARGE_TURN:
+        return []
+    degrees = number(float(np.degrees(turn)))
+    said = f"parts turn by up to {degrees} degrees: the answer is for small movements only"
+    return [said + "; with these loads it is a sign, not a number"]
 
 
 def _vector(values: Array) -> list[float]:
@@ -132,6 +152,7 @@ def deflection_dict(case: StaticCase) -> dict[str, Any]:
                 "rotation_rad": _vector(answer.probe_twists[k, 3:]),
                 "distance_mm": float(np.linalg.norm(answer.probe_twists[k, :3])) / MM,
                 "distance_interval_95_mm": case.interval_mm(k),
+                "distance_rigid_walls_mm": case.stiffest_mm(k),
             }
             for k, point in enumerate(points)
         ],
@@ -155,6 +176,7 @@ def deflection_dict(case: StaticCase) -> dict[str, Any]:
             for k, support in enumerate(assembly.supports)
         ],
         "work_j": answer.work,
+        "warnings": _warnings(case),
         "joint_stiffness": joint_stiffness(assembly),
         "not_modelled": list(not_modelled(assembly)),
         "technic_version": __version__,
@@ -193,7 +215,9 @@ def _more(total: int) -> list[str]:
 
 
 def _sure(case: StaticCase, k: int) -> str:
-    interval = case.interval_mm(k)
+    interval, stiffest = case.interval_mm(k), case.stiffest_mm(k)
+    if stiffest is not None:
+        return f" ({number(stiffest)} mm if bores kept their shape)"
     if interval is None:
         return ""
     low, high = (number(value) for value in interval)
@@ -268,6 +292,8 @@ def deflection_text(case: StaticCase, style: Style | None = None) -> str:
             "   ",
             "      ",
         )
+    for sentence in _warnings(case):
+        lines += ["", *style.wrap(f"Too far: {sentence}.", "", "   ")]
     missing = not_modelled(assembly)
     if missing:
         lines += ["", style("bold", "Not modelled")]

@@ -21,7 +21,7 @@ __all__ = [
     "nice",
 ]
 
-_DEFORMED_SHARE = 0.07
+DEFORMED_SHARE = 0.07
 """The furthest point of the deformed shape goes this share of the model's diagonal."""
 
 
@@ -94,4 +94,4 @@ def deformation_scale(report: RigidityReport, drawing: Drawing, furthest: float)
     It is measured against the heaviest component, which is the one that deforms.
     """
     moving = np.concatenate([drawing.points[k] for k in report.components[0].parts])
-    return nice(_DEFORMED_SHARE * float(np.linalg.norm(np.ptp(moving, axis=0))) / furthest)
+    return nice(DEFORMED_SHARE * float(np.linalg.norm(np.ptp(moving, axis=0))) / furthest)
