@@ -9,10 +9,13 @@ from technic.report.drawing import Drawing, drawing_of
 from technic.report.files import write_bytes
 from technic.report.html.pack import Block, pack
 from technic.report.html.shell import embedded, render
+from technic.report.html.stiffness_plot import stiffness_plots
 from technic.report.html.tables import (
     SPOT_ROWS,
     finding_groups,
+    model_words,
     motion_rows,
+    plain_rows,
     spot_rows,
     stiffness_rows,
     unknown_rows,
@@ -21,6 +24,7 @@ from technic.report.pattern import describe_field
 from technic.report.wording import count, number
 from technic.report.worst_field import worst_field
 from technic.rigidity.result import RigidityReport, Verdict
+from technic.rigidity.sentences import import_effects
 from technic.rigidity.serialize import size_mm
 
 __all__ = ["TONES", "facts", "page", "write_page"]
@@ -44,6 +48,9 @@ def facts(report: RigidityReport) -> list[tuple[str, str, str]]:
             else "95 % interval: {} to {} N/m".format(*(number(v) for v in rigidity.interval_95))
         )
         found.append(("Rigidity, worst case", f"{number(rigidity.value)} N/m", sure))
+        if rigidity.rigid_walls is not None:
+            walls = f"{number(rigidity.rigid_walls)} N/m"
+            found.append(("With rigid walls of bores", walls, "the truth lies between the two"))
         if rigidity.measure == "mean_square":
             found.append(
                 (
@@ -103,6 +110,7 @@ def page(
         contents = pack(report, drawing, block, spots=SPOT_ROWS)
     motions = [] if contents is None else contents["motions"]
     played = {entry["number"]: n for n, entry in enumerate(motions)}
+    origin, plots = stiffness_plots(report)
     return render(
         "page.html.j2",
         contents,
@@ -124,6 +132,11 @@ def page(
         unknown=unknown_rows(report),
         findings=finding_groups(report),
         stiffness=stiffness_rows(report),
+        calibration=origin,
+        plots=plots,
+        plain=plain_rows(report),
+        models=model_words(report),
+        effects=list(import_effects(report.assembly, report.library_models)),
         not_modelled=report.not_modelled,
         rigidity=report.rigidity,
         mobility=report.mobility,

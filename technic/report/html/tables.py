@@ -17,7 +17,9 @@ from technic.units import MM
 __all__ = [
     "SPOT_ROWS",
     "finding_groups",
+    "model_words",
     "motion_rows",
+    "plain_rows",
     "spot_rows",
     "stiffness_rows",
     "unknown_rows",
@@ -84,6 +86,28 @@ def motion_rows(report: RigidityReport, played: dict[int, int]) -> list[dict[str
         if len(rows) == _MOTION_ROWS:
             break
     return rows
+
+
+_MODEL_WORDS = {"solid": "solid", "frame": "frame", "rigid": "rigid body"}
+
+
+def model_words(report: RigidityReport) -> str:
+    """Return how many parts are modelled how."""
+    said = [f"{n} as {_MODEL_WORDS.get(kind, kind)}" for kind, n in report.part_models.items() if n]
+    return f"Parts: {', '.join(said)}." if said else "The model has no parts."
+
+
+def plain_rows(report: RigidityReport) -> list[dict[str, Any]]:
+    """Return the kinds of part without a solid model, with the reason."""
+    return [
+        {
+            "part": f"{plain.name} ({plain.number})" if plain.number else plain.name,
+            "count": plain.count,
+            "model": _MODEL_WORDS.get(plain.model, plain.model),
+            "why": plain.reason,
+        }
+        for plain in report.plain_parts
+    ]
 
 
 def unknown_rows(report: RigidityReport) -> list[dict[str, Any]]:
