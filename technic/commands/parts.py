@@ -147,8 +147,10 @@ def show_cache(
     from technic.errors import UsageError
     from technic.ldraw import caches as kept
     from technic.report.json import STDOUT, write_json
+    from technic.system.solid_cache import limit
 
     found = kept.caches()
+    limits = {"solids": limit()}
     if clear:
         try:
             count, size = kept.clear()
@@ -158,11 +160,19 @@ def show_cache(
         found = kept.caches()
     if json is not None:
         rows = [
-            {"name": c.name, "folder": str(c.folder), "files": len(c.files), "bytes": c.size}
+            {
+                "name": c.name,
+                "folder": str(c.folder),
+                "files": len(c.files),
+                "bytes": c.size,
+                "limit_bytes": limits.get(c.name),
+            }
             for c in found
         ]
         write_json({"schema": "technic-cache/1", "caches": rows}, json)
     if json != STDOUT:
         for cache in found:
             head = f"{cache.title}: {len(cache.files)} files, {cache.size / 1024:.0f} kB"
-            sys.stdout.write(f"{head} in {cache.folder}\n")
+            most = limits.get(cache.name)
+            bound = "" if most is None else f" (at most {most / 2**20:.0f} MB)"
+            sys.stdout.write(f"{head} in {cache.folder}{bound}\n")

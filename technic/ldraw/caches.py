@@ -14,7 +14,10 @@ from technic.folders import cache_folder
 
 __all__ = ["Cache", "caches", "clear"]
 
-_KINDS: Final = {"libraries": ("lists of the files in parts libraries", ("*.txt", ".index-*"))}
+_KINDS: Final = {
+    "libraries": ("lists of the files in parts libraries", ("*.txt", ".index-*")),
+    "solids": ("solid models of library parts", ("*.zip", "*.txt", ".solid-*")),
+}
 """Subfolder: what is in it, and the names of its files."""
 
 
@@ -40,8 +43,15 @@ def caches() -> tuple[Cache, ...]:
             for path in folder.glob(pattern)
             if path.is_file() and not path.is_symlink()
         )
-        found.append(Cache(name, title, folder, tuple(files), sum(f.stat().st_size for f in files)))
+        found.append(Cache(name, title, folder, tuple(files), sum(map(_size, files))))
     return tuple(found)
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except FileNotFoundError:  # another program has deleted it meanwhile
+        return 0
 
 
 def clear() -> tuple[int, int]:

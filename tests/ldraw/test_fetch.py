@@ -236,15 +236,23 @@ def test_fetch_and_cache_commands(run, server, target, monkeypatch, tmp_path):
     assert (code, out) == (0, "")
     assert str(target) in err
     _, out, _ = run("parts", "cache", "--json", "-")
-    (cache,) = json.loads(out)["caches"]
-    assert cache["files"] == 1
-    assert cache["bytes"] > 0
+    lists, solids = json.loads(out)["caches"]
+    assert (lists["files"], solids["files"]) == (1, 0)
+    assert (lists["limit_bytes"], solids["limit_bytes"]) == (None, 500 * 2**20)
+    assert lists["bytes"] > 0
+    solids_folder = tmp_path / "cache" / "solids"
+    solids_folder.mkdir()
+    for name in ("0a.zip", "0b.txt", ".solid-x", "mine.odt"):
+        (solids_folder / name).write_text("x")
+    _, out, _ = run("parts", "cache")
+    assert "solid models of library parts: 3 files" in out
     stranger = tmp_path / "cache" / "libraries" / "mine.odt"
     stranger.write_text("not the program's")
     code, out, err = run("parts", "cache", "--clear")
     assert "0 files" in out
-    assert "deleted 1 files" in err
+    assert "deleted 4 files" in err
     assert stranger.exists()
+    assert [path.name for path in solids_folder.iterdir()] == ["mine.odt"]
     assert run("parts", "fetch", "--url", "gopher://x")[0] == 2
     server.status = 503
     assert run("parts", "fetch")[0] == 4
