@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-__all__ = ["cache_folder", "data_folder"]
+__all__ = ["cache_folder", "config_folder", "data_folder"]
 
 
 def cache_folder() -> Path:
@@ -16,6 +16,16 @@ def cache_folder() -> Path:
     import platformdirs
 
     return Path(platformdirs.user_cache_dir("technic-rigidity", appauthor=False))
+
+
+def config_folder() -> Path:
+    """Return the folder for the user's settings: ``TECHNIC_CONFIG`` or the user's folder for them."""
+    explicit = os.environ.get("TECHNIC_CONFIG")
+    if explicit:
+        return Path(explicit)
+    import platformdirs
+
+    return Path(platformdirs.user_config_dir("technic-rigidity", appauthor=False))
 
 
 def data_folder() -> Path:

@@ -13,6 +13,8 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 os.environ.setdefault("PYVISTA_OFF_SCREEN", "true")
+# Settings of the person who runs the tests must not reach them.
+os.environ["TECHNIC_CONFIG"] = str(Path(__file__).resolve().parent / "no_settings")
 
 import hypothesis
 import pytest

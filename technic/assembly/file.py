@@ -21,8 +21,10 @@ import numpy as np
 from technic.assembly.joint_types import JointType
 from technic.assembly.model import Assembly, Finding, FindingKind, Joint, Part, Support
 from technic.assembly.shapes import ShapeFault, as_points, make_shape, section_size
+from technic.assembly.stiffness import StiffnessTable, default_table
 from technic.assembly.typed_joints import (
     AxisFault,
+    connection_stiffness,
     held_motions,
     joint_axes,
     stiffness_of,
@@ -51,8 +53,14 @@ def schema() -> dict[str, Any]:
     return found
 
 
-def load_assembly(path: str | Path) -> Assembly:
+def load_assembly(path: str | Path, *, table: StiffnessTable | None = None) -> Assembly:
     """Read an assembly file.
+
+    Parameters
+    ----------
+    path : path-like
+    table : StiffnessTable, optional
+        Stiffness of the connections that joints name; default: the shipped one.
 
     Raises
     ------
@@ -81,11 +89,15 @@ def load_assembly(path: str | Path) -> Assembly:
     if repeated:
         raise SchemaError([f"$: {fault}" for fault in repeated], path=path)
     source = {"path": str(path), "sha256": sha256(raw).hexdigest(), "format": "assembly"}
-    return build_assembly(data, path=path, source=source)
+    return build_assembly(data, path=path, source=source, table=table)
 
 
 def build_assembly(
-    data: Any, *, path: Path | None = None, source: Mapping[str, Any] | None = None
+    data: Any,
+    *,
+    path: Path | None = None,
+    source: Mapping[str, Any] | None = None,
+    table: StiffnessTable | None = None,
 ) -> Assembly:
     """Return the assembly that parsed JSON describes.
 
@@ -97,6 +109,8 @@ def build_assembly(
         The file, for messages; mesh files are looked for beside it.
     source : mapping, optional
         What `Assembly.source` becomes.
+    table : StiffnessTable, optional
+        Stiffness of the connections that joints name; default: the shipped one.
 
     Raises
     ------
@@ -106,7 +120,8 @@ def build_assembly(
     faults = list(_schema_faults(data))
     if faults:
         raise SchemaError(faults, path=path)
-    builder = _Build(data, Path() if path is None else path.parent)
+    folder = Path() if path is None else path.parent
+    builder = _Build(data, folder, table or default_table())
     assembly = builder.run("assembly" if path is None else path.stem, dict(source or {}))
     if builder.faults or assembly is None:
         raise SchemaError(builder.faults, path=path)
@@ -164,9 +179,10 @@ def _kept(shape: Mapping[str, Any], material: str, points: Array | None) -> dict
 class _Build:
     """One pass over a file that obeys the schema; faults are collected, not raised."""
 
-    def __init__(self, data: Mapping[str, Any], folder: Path) -> None:
+    def __init__(self, data: Mapping[str, Any], folder: Path, table: StiffnessTable) -> None:
         self.data = data
         self.folder = folder
+        self.table = table
         self.dimension: int = data["dimension"]
         self.faults: list[str] = []
         self.findings: list[Finding] = []
@@ -338,6 +354,12 @@ class _Build:
         size = min(section_size(self.parts[p].body) for p in pair)
         given, jitter = row.get("stiffness"), row.get("jitter")
         values, provenance = stiffness_of(held, given, jitter, size)
+        if "connection" in row:
+            try:
+                values, provenance = connection_stiffness(row, held, self.table)
+            except AxisFault as fault:
+                self.faults.append(f"$.joints[{k}].{fault.key}: {fault.message}")
+                return None
         for motion in unused_stiffness(type_, given, jitter):
             message = (
                 f"joint {name}: the {motion} stiffness or play is not used, a {type_} frees it"
@@ -351,7 +373,7 @@ class _Build:
             axes=axes,
             held=held,
             stiffness=values,
-            connection=type_.value,
+            connection=row.get("connection", type_.value),
             provenance=row.get("provenance", provenance),
         )
 

@@ -126,6 +126,12 @@ class StiffnessTable:
         Connection and motion of every value with a known uncertainty.
     log_covariance : (k, k) ndarray
         Covariance of the natural logarithms of these values.
+    path : str
+        File it was read from; empty for the shipped one.
+    found : str
+        How it came into force: "shipped", "given", or where it was found.
+    calibration : mapping
+        What the file says of the calibration it came from: `file`, `date`, `rigs`, `readings`...
     """
 
     name: str
@@ -133,6 +139,9 @@ class StiffnessTable:
     sources: Mapping[str, str] = field(default_factory=dict)
     measured: tuple[tuple[str, str], ...] = ()
     log_covariance: Array = field(default_factory=lambda: readonly(np.zeros((0, 0))), compare=False)
+    path: str = ""
+    found: str = "shipped"
+    calibration: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     def get(self, connection: str) -> ConnectionStiffness:
         """Return the entry of a connection.
@@ -158,11 +167,17 @@ def default_table() -> StiffnessTable:
     return parse_table(tomllib.loads(resource.read_text(encoding="utf-8")), "default.toml")
 
 
-def read_table(path: str | Path) -> StiffnessTable:
+def read_table(path: str | Path, *, found: str = "given") -> StiffnessTable:
     """Read a stiffness table.
 
     Connections that the file leaves out are taken from the shipped table, which their provenance
     shows.
+
+    Parameters
+    ----------
+    path : path-like
+    found : str
+        How it came into force, for reports.
 
     Raises
     ------
@@ -184,7 +199,16 @@ def read_table(path: str | Path) -> StiffnessTable:
         {**base.sources, **table.sources},
         table.measured,
         table.log_covariance,
+        path=str(path),
+        found=found,
+        calibration=_told(data.get("calibration", {})),
     )
+
+
+def _told(section: Any) -> dict[str, Any]:
+    """Return what a file says of its calibration, without the numbers that are read elsewhere."""
+    given = section if isinstance(section, dict) else {}
+    return {k: v for k, v in given.items() if k not in ("parameters", "log_covariance")}
 
 
 def parse_table(data: Mapping[str, Any], path: str | Path) -> StiffnessTable:

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from technic.assembly.joint_types import HELD, MOTION_NAMES, JointType
+from technic.assembly.stiffness import StiffnessTable
 from technic.geometry import Array, axes_from, readonly
 
 __all__ = [
@@ -16,6 +17,7 @@ __all__ = [
     "NEEDS_AXIS",
     "NEEDS_SECOND",
     "AxisFault",
+    "connection_stiffness",
     "held_motions",
     "joint_axes",
     "stiffness_of",
@@ -56,7 +58,7 @@ ALONG: Final = 1e-9
 
 
 class AxisFault(Exception):
-    """What is wrong with an axis: the key and a sentence."""
+    """What is wrong with an axis or a connection: the key and a sentence."""
 
     def __init__(self, key: str, message: str) -> None:
         super().__init__(message)
@@ -172,6 +174,45 @@ def stiffness_of(
     if len(origins) == 1:
         return readonly(values), next(iter(origins))
     return readonly(values), "; ".join(f"{o} ({', '.join(n)})" for o, n in origins.items())
+
+
+def connection_stiffness(
+    row: Mapping[str, Any], held: Array, table: StiffnessTable
+) -> tuple[Array, str]:
+    """Return the six stiffnesses of a joint that names a connection of a table, and their provenance.
+
+    Parameters
+    ----------
+    row : mapping
+        The joint in the file.
+    held : (6,) ndarray of bool
+    table : StiffnessTable
+
+    Raises
+    ------
+    AxisFault
+        The table has no such connection or no value for a held motion, or the joint says its stiffness
+        twice.
+    """
+    name = row["connection"]
+    for other in ("stiffness", "jitter", "provenance"):
+        if other in row:
+            raise AxisFault("connection", f"the table says it, and {other!r} says it too: give one")
+    entry = table.connections.get(name)
+    if entry is None:
+        known = ", ".join(sorted(table.connections))
+        raise AxisFault(
+            "connection", f"the stiffness table {table.name!r} has no {name!r}; it has {known}"
+        )
+    motions = [m for k, m in enumerate(MOTION_NAMES) if held[k]]
+    missing = [m for m in dict.fromkeys(motions) if m not in entry.values]
+    if missing:
+        raise AxisFault(
+            "connection",
+            f"{name!r} has no {', '.join(missing)} in the stiffness table, and a {row['type']} "
+            "joint holds it",
+        )
+    return readonly(np.where(held, entry.vector(), 0.0)), entry.provenance(held)
 
 
 def unused_stiffness(type_: JointType, given: Any, jitter: Mapping[str, float] | None) -> list[str]:

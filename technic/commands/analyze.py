@@ -35,7 +35,7 @@ from technic.commands.options import (
     ViewOption,
 )
 from technic.commands.outputs import Outputs
-from technic.commands.reading import model_options, reading
+from technic.commands.reading import check_table, model_options, reading
 from technic.commands.solids import make_solids, make_walls
 
 if TYPE_CHECKING:
@@ -74,6 +74,22 @@ def _demands(report: RigidityReport, options: AnalysisOptions) -> list[str]:
     return missed
 
 
+def _unsure(report: RigidityReport, options: AnalysisOptions) -> str:
+    """Return a warning when the calibration's uncertainty leaves open whether --min-rigidity is met."""
+    rigidity, least = report.rigidity, options.min_rigidity
+    if rigidity is None or least is None or rigidity.interval_95 is None:
+        return ""
+    low, high = rigidity.interval_95
+    if not low <= least <= high:
+        return ""
+    from technic.report.wording import number
+
+    return (
+        f"whether --min-rigidity is met is not sure: the measured joints leave {number(low)} to "
+        f"{number(high)} N/m with 95 % confidence"
+    )
+
+
 def run(model: Path, options: AnalysisOptions) -> None:
     """Load, analyze and report, as `technic analyze` and `technic demo` do.
 
@@ -94,6 +110,7 @@ def run(model: Path, options: AnalysisOptions) -> None:
     with Outputs(options) as outputs:
         how = reading(model, options.how)
         assembly = load(model, **how)
+        check_table(assembly, how)
         if options.fix:
             supports = tuple(parse_fix(assembly, text) for text in options.fix)
             assembly = replace(assembly, supports=assembly.supports + supports)
@@ -120,6 +137,8 @@ def run(model: Path, options: AnalysisOptions) -> None:
         missed = _demands(report, options)
         for sentence in missed:
             typer.echo(f"technic: {sentence}", err=True)
+        if unsure := _unsure(report, options):
+            typer.echo(f"technic: warning: {unsure}", err=True)
         outputs.write(model, report)
     if missed:
         raise typer.Exit(_BELOW_DEMAND)

@@ -137,7 +137,8 @@ CalibrationOption = Annotated[
     typer.Option(
         "--calibration",
         metavar="TOML",
-        help="Stiffness table from `technic calibrate`, used instead of the shipped one.",
+        help="Stiffness table from `technic calibrate`. Left out: the one that technic.toml names "
+        "(beside the model, or in your settings), else the shipped one; shipped: always that.",
     ),
 ]
 GearsOption = Annotated[

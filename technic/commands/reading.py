@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import fields
 from functools import partial, wraps
 from pathlib import Path
-from typing import Any, Final, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, get_type_hints
 
 from technic.commands.options import (
     AxleSlideOption,
@@ -27,7 +27,10 @@ from technic.commands.options import (
 )
 from technic.errors import UsageError
 
-__all__ = ["model_options", "reading"]
+if TYPE_CHECKING:
+    from technic.assembly.model import Assembly
+
+__all__ = ["check_table", "model_options", "reading"]
 
 
 _OPTIONS: Final[dict[str, Any]] = {
@@ -103,6 +106,8 @@ def _sources(options: ModelOptions) -> dict[str, Any]:
 def reading(model: Path, how: ModelOptions) -> dict[str, Any]:
     """Return the options of the reader; an assembly file says itself what its joints hold.
 
+    A stiffness table that settings name is used as if it had been given; see `technic.commands.config`.
+
     Parameters
     ----------
     model : Path
@@ -115,19 +120,18 @@ def reading(model: Path, how: ModelOptions) -> dict[str, Any]:
     TechnicError
         The stiffness table cannot be read.
     """
+    from technic.commands.config import table_in_force
+
+    table = table_in_force(model, how.calibration)
     if model.suffix.lower() == ".json":
         if how.axle_slide != "held":
             raise UsageError("--axle-slide is for LDraw models; an assembly file types its joints")
-        if how.calibration is not None:
-            raise UsageError(
-                "--calibration is for LDraw models; an assembly file gives its own stiffnesses"
-            )
-        if how != ModelOptions(no_library=how.no_library):
+        if how != ModelOptions(no_library=how.no_library, calibration=how.calibration):
             raise UsageError(
                 "--library, --library-solids, --shadow, --gears, --inner and --overrides are for "
                 "LDraw models"
             )
-        return {}
+        return {} if table is None else {"table": table}
     options: dict[str, Any] = {
         "axle_slide": how.axle_slide,
         "gears": how.gears,
@@ -136,8 +140,30 @@ def reading(model: Path, how: ModelOptions) -> dict[str, Any]:
         "solids": how.library_solids,
         **_sources(how),
     }
-    if how.calibration is not None:
-        from technic.assembly.stiffness import read_table
-
-        options["table"] = read_table(how.calibration)
+    if table is not None:
+        options["table"] = table
     return options
+
+
+def check_table(assembly: Assembly, options: dict[str, Any]) -> None:
+    """Refuse a stiffness table that says nothing about an assembly file.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    options : dict
+        From `reading`.
+
+    Raises
+    ------
+    UsageError
+        A table was asked for, and no joint of the file names a connection.
+    """
+    table = options.get("table")
+    if table is None or table.found != "given" or assembly.source.get("format") == "ldraw":
+        return  # a table of the settings is not meant for every file
+    if not any(joint.connection in table.connections for joint in assembly.joints):
+        raise UsageError(
+            "--calibration changes nothing here: no joint of the assembly file names a connection, "
+            'such as "connection": "pin/pin_hole", so they keep the stiffnesses that the file gives'
+        )

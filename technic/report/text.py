@@ -23,6 +23,7 @@ from technic.report.wording import (
     spot_words,
 )
 from technic.report.worst_field import worst_field
+from technic.rigidity.provenance import spots_sentence, table_sentences, verdict_sentence
 from technic.rigidity.result import MotionKind, RigidityReport, Verdict
 from technic.rigidity.sentences import import_effects
 from technic.rigidity.serialize import joint_stiffness, size_mm, spot_place
@@ -201,6 +202,7 @@ def _rigidity(report: RigidityReport, style: Style) -> list[str]:
             f"   How sure: the measured joints alone leave {number(low)} to {number(high)} N/m "
             "with 95 % confidence."
         )
+        lines += style.wrap(verdict_sentence(report), "   ")
     if rigidity.rigid_walls is not None:
         lines += style.wrap(
             f"Bores give as the mean over their wall; if they kept their shape it would be "
@@ -234,6 +236,7 @@ def _weak_spots(report: RigidityReport, style: Style) -> list[str]:
     if rest:
         share = 100.0 * sum(spot.energy_share for spot in report.weak_spots[len(shown) :])
         lines.append(f"     {share:4.1f} %  in {rest} more, see --json")
+    lines += style.wrap(said, "   ") if (said := spots_sentence(report)) else []
     return lines
 
 
@@ -304,6 +307,8 @@ def _assumptions(report: RigidityReport, style: Style) -> list[str]:
     entries = merged_stiffness(joint_stiffness(report.assembly))
     if entries:
         lines += ["", style("bold", "Joints and where their stiffness comes from")]
+        for said_of_it in table_sentences(report):
+            lines += style.wrap(said_of_it, "   ", "      ")
     for (name, kind, source), (total, values) in entries.items():
         said = []
         for key, numbers in values.items():

@@ -34,6 +34,7 @@ from technic.rigidity.result import (
     Verdict,
 )
 from technic.rigidity.sentences import motion_sentence, not_modelled, reason
+from technic.rigidity.stability import Pencil, stability
 from technic.rigidity.uncertainty import rigidity_interval
 from technic.rigidity.worst_case import mode_of, node_fields, rigid_parts, weak_spots
 from technic.system.assemble import System, assemble
@@ -108,16 +109,19 @@ def analyze(
     with _timed(timings, "assemble"):
         system = assemble(assembly, element=FACTORIES[parts])
     with _timed(timings, "eigen"):
+        pencils = [_pencil(system, kin, body.motions, measure) for body in bodies]
         found = [
-            _elastic(system, kin, body.motions, measure, modes if c == 0 else 1, shown=c == 0)
-            for c, body in enumerate(bodies)
+            _elastic(system, body.motions, pencil, measure, modes if c == 0 else 1, shown=c == 0)
+            for c, (body, pencil) in enumerate(zip(bodies, pencils, strict=True))
         ]
     if found:
         found[0] = (_with_interval(system, *found[0], table), found[0][1])
     if found and port_walls == "rigid":
         with _timed(timings, "rigid_walls"):
             stiffer = assemble(assembly, element=rigid_walls(assembly))
-            upper, _ = _elastic(stiffer, kin, bodies[0].motions, measure, 1, shown=True)
+            first_body = bodies[0].motions
+            walls = _pencil(stiffer, kin, first_body, measure)
+            upper, _ = _elastic(stiffer, first_body, walls, measure, 1, shown=True)
         if found[0][0] is not None and upper is not None:
             found[0] = (replace(found[0][0], rigid_walls=upper.value), found[0][1])
     with _timed(timings, "weak_spots"):
@@ -125,6 +129,7 @@ def analyze(
         first = main_modes[0].unknowns if main_modes else None
         spots = weak_spots(system, first) if first is not None else ()
         fields = node_fields(system, first) if first is not None else ({}, {})
+        stable = stability(system, pencils[0], main_modes, spots, table) if main_modes else None
     motions = tuple(
         replace(m, sentence=motion_sentence(assembly, m))
         for kind in MotionKind
@@ -161,6 +166,8 @@ def analyze(
         qualifier=_qualifier(assembly),
         not_modelled=not_modelled(assembly),
         timings=timings,
+        table=table,
+        stability=stable,
         node_points=fields[0],
         node_displacements=fields[1],
     )
@@ -196,38 +203,50 @@ def _proof(kin: Kinematics, motions: ComponentMotions, component: int) -> str:
     return "exact" if modular_rank(rows) == rank else "numerical"
 
 
-def _elastic(
-    system: System,
-    kin: Kinematics,
-    motions: ComponentMotions,
-    measure: Measure,
-    count: int,
-    *,
-    shown: bool,
-) -> tuple[Rigidity | None, tuple[Mode, ...]]:
-    """Return the rigidity and the lowest modes of one component."""
+def _pencil(system: System, kin: Kinematics, motions: ComponentMotions, measure: Measure) -> Pencil:
+    """Return the eigenproblem of one component."""
     parts = list(motions.parts)
-    if len(parts) == 1 and not shown:
-        return None, ()  # a loose part: it says nothing about the model
     own = np.concatenate([np.arange(system.offsets[p], system.offsets[p + 1]) for p in parts])
     member = np.isin(kin.component_of, kin.component_of[parts[0]])
     rows = np.array([member[kin.owners[k][0]] for k in system.rows.link], dtype=bool)
     elastic = rows & system.elastic
     a = sparse.csr_array(system.A[elastic][:, own])
     joints = a.T @ sparse.diags_array(system.rows.stiffness[elastic]) @ a
-    stiffness = sparse.csr_array(system.K[own][:, own] + joints)
     mass = sum(system.assembly.parts[p].mass_properties.mass for p in parts)
     full = system.mass_matrix / mass if measure == "mean_square" else system.nodal()
-    weight = sparse.csr_array(full[own][:, own])
-    constraints = sparse.csr_array(system.A[rows & ~system.elastic][:, own])
     rigid = system.R[own][:, np.concatenate([np.arange(6 * p, 6 * p + 6) for p in parts])]
     scale = sparse.diags_array(np.tile(kin.units, len(parts)))
-    moving = sparse.csc_array(rigid @ (scale @ motions.twists))
-    pairs = elastic_modes(stiffness, weight, constraints, moving, count)
+    return Pencil(
+        own=own,
+        stiffness=sparse.csr_array(system.K[own][:, own] + joints),
+        measure=sparse.csr_array(full[own][:, own]),
+        constraints=sparse.csr_array(system.A[rows & ~system.elastic][:, own]),
+        motions=sparse.csc_array(rigid @ (scale @ motions.twists)),
+        mass=float(mass),
+    )
+
+
+def _elastic(
+    system: System,
+    motions: ComponentMotions,
+    pencil: Pencil,
+    measure: Measure,
+    count: int,
+    *,
+    shown: bool,
+) -> tuple[Rigidity | None, tuple[Mode, ...]]:
+    """Return the rigidity and the lowest modes of one component."""
+    if len(motions.parts) == 1 and not shown:
+        return None, ()  # a loose part: it says nothing about the model
+    pairs = elastic_modes(
+        pencil.stiffness, pencil.measure, pencil.constraints, pencil.motions, count
+    )
     if not len(pairs.values):
         return None, ()
     value = float(pairs.values[0])
-    frequency = float(np.sqrt(value / mass) / (2 * np.pi)) if measure == "mean_square" else None
+    frequency = (
+        float(np.sqrt(value / pencil.mass) / (2 * np.pi)) if measure == "mean_square" else None
+    )
     rigidity = Rigidity(value, frequency, measure, float(pairs.residuals[0]))
     if not shown:
         return rigidity, ()
@@ -235,7 +254,7 @@ def _elastic(
     inertia = rigid_parts(system)
     for k in range(len(pairs.values)):
         unknowns: Array = np.zeros(system.size)
-        unknowns[own] = pairs.vectors[:, k]
+        unknowns[pencil.own] = pairs.vectors[:, k]
         out.append(mode_of(system, inertia, float(pairs.values[k]), unknowns, measure))
     return rigidity, tuple(out)
 
@@ -248,8 +267,10 @@ def _with_interval(
 ) -> Rigidity | None:
     if rigidity is None or table is None or not modes:
         return rigidity
-    interval = rigidity_interval(system, modes[0].unknowns, rigidity.value, table)
-    return replace(rigidity, interval_95=interval)
+    found = rigidity_interval(system, modes[0].unknowns, rigidity.value, table)
+    if found is None:
+        return rigidity
+    return replace(rigidity, interval_95=found[0], log_slopes=found[1])
 
 
 def _verdict(assembly: Assembly, kin: Kinematics, bodies: list[_Body]) -> Verdict:

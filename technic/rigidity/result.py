@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from technic.assembly.model import Assembly
+from technic.assembly.stiffness import StiffnessTable
 from technic.geometry import Array, readonly
 from technic.system.library_models import LibraryModels
 from technic.system.part_models import PlainPart
@@ -23,6 +24,8 @@ __all__ = [
     "MotionType",
     "Rigidity",
     "RigidityReport",
+    "SpotRange",
+    "Stability",
     "Verdict",
     "WeakSpot",
 ]
@@ -144,6 +147,8 @@ class Rigidity:
         Relative residual of the eigenpair.
     interval_95 : (float, float) or None
         From the covariance of calibrated stiffnesses; None when nothing is calibrated.
+    log_slopes : tuple of float
+        ``d log value / d log s`` of every measured stiffness of the table; empty when none is.
     rigid_walls : float or None
         The same number (N/m) with bores that keep their shape: the truth lies between `value` and it;
         None when it was not asked for.
@@ -155,6 +160,7 @@ class Rigidity:
     residual: float
     interval_95: tuple[float, float] | None = None
     rigid_walls: float | None = None
+    log_slopes: tuple[float, ...] = ()
 
     @property
     def compliance_mm_per_n(self) -> float:
@@ -205,6 +211,38 @@ class WeakSpot:
     parts: tuple[int, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class SpotRange:
+    """Where a weak spot may stand, and its share in the energy, with 95 % confidence."""
+
+    ranks: tuple[int, int]
+    energy_shares: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Stability:
+    """What measured stiffnesses leave open; the verdict does not rest on stiffness.
+
+    Parameters
+    ----------
+    draws : int
+        How often stiffnesses were drawn.
+    spots : tuple of SpotRange
+        Of the first weak spots, in their order.
+    """
+
+    draws: int
+    spots: tuple[SpotRange, ...]
+
+    @property
+    def first_open(self) -> int | None:
+        """Rank of the first weak spot that may stand elsewhere; None when all of them stay."""
+        for rank, spot in enumerate(self.spots, start=1):
+            if spot.ranks != (rank, rank):
+                return rank
+        return None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Component:
     """Parts that hang together through joints."""
@@ -253,6 +291,10 @@ class RigidityReport:
     not_modelled : tuple of str
     timings : mapping
         Seconds per stage.
+    table : StiffnessTable or None
+        Stiffness table in force; None when it is the shipped one.
+    stability : Stability or None
+        None when no stiffness was measured.
     node_points, node_displacements : mapping of int to (m, 3) arrays
         Per part: nodes in world coordinates (m) and their displacement in the worst mode (m, for an RMS
         of 1 m).
@@ -275,6 +317,8 @@ class RigidityReport:
     qualifier: str = ""
     not_modelled: tuple[str, ...] = ()
     timings: Mapping[str, float] = field(default_factory=dict)
+    table: StiffnessTable | None = None
+    stability: Stability | None = None
     node_points: Mapping[int, Array] = field(default_factory=dict)
     node_displacements: Mapping[int, Array] = field(default_factory=dict)
 

@@ -21,6 +21,7 @@ from technic.assembly.joint_types import MOTION_NAMES
 from technic.assembly.model import Assembly, FindingKind, Joint, Part
 from technic.geometry import Array
 from technic.parts.definition import PortKind, outline
+from technic.rigidity.provenance import stability_dict, table_dict
 from technic.rigidity.result import (
     Component,
     Mobility,
@@ -121,6 +122,7 @@ def _rigidity(rigidity: Rigidity | None) -> dict[str, Any] | None:
         "compliance_mm_per_n": rigidity.compliance_mm_per_n,
         "frequency_hz": rigidity.frequency_hz,
         "interval_95": None if rigidity.interval_95 is None else list(rigidity.interval_95),
+        "log_slopes": list(rigidity.log_slopes),
         "measure": rigidity.measure,
         "residual": rigidity.residual,
         "port_walls": None
@@ -213,6 +215,16 @@ def _weak_spot(assembly: Assembly, spot: WeakSpot) -> dict[str, Any]:
         "submodel": None if source is None else source.submodel,
         "step": None if source is None else source.step,
         "line": None if source is None else source.line,
+    }
+
+
+def _spot_range(report: RigidityReport, k: int) -> dict[str, Any]:
+    """Return where a weak spot may stand under the calibration's uncertainty; null: not examined."""
+    ranges = () if report.stability is None else report.stability.spots
+    known = ranges[k] if k < len(ranges) else None
+    return {
+        "rank_interval_95": None if known is None else list(known.ranks),
+        "energy_share_interval_95": None if known is None else list(known.energy_shares),
     }
 
 
@@ -370,9 +382,14 @@ def to_dict(report: RigidityReport) -> dict[str, Any]:
         "rigidity": _rigidity(report.rigidity),
         "spectrum_n_per_m": [mode.value for mode in report.modes],
         "worst_case": _worst_case(report),
-        "weak_spots": [_weak_spot(assembly, spot) for spot in report.weak_spots],
+        "weak_spots": [
+            {**_weak_spot(assembly, spot), **_spot_range(report, k)}
+            for k, spot in enumerate(report.weak_spots)
+        ],
+        "stability": stability_dict(report),
         "components": [_component(assembly, component) for component in report.components],
         "joint_stiffness": joint_stiffness(assembly),
+        "stiffness_table": table_dict(report),
         "not_modelled": list(report.not_modelled),
         "timings_s": {name: float(seconds) for name, seconds in report.timings.items()},
         "technic_version": __version__,

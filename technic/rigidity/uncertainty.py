@@ -39,8 +39,10 @@ def energy_shares(system: System, x: Array, parameters: tuple[Parameter, ...]) -
 
 def rigidity_interval(
     system: System, x: Array, value: float, table: StiffnessTable
-) -> tuple[float, float] | None:
-    """Return the 95 % interval of an eigenvalue; None when nothing in it was measured.
+) -> tuple[tuple[float, float], tuple[float, ...]] | None:
+    """Return the 95 % interval of an eigenvalue and its slopes; None when nothing in it was measured.
+
+    The slopes are ``d log lambda / d log s`` of every measured stiffness.
 
     Parameters
     ----------
@@ -59,6 +61,5 @@ def rigidity_interval(
     if not np.any(shares > 0.0):
         return None
     deviation = float(np.sqrt(shares @ table.log_covariance @ shares))
-    return value * float(np.exp(-NORMAL_95 * deviation)), value * float(
-        np.exp(NORMAL_95 * deviation)
-    )
+    half = float(np.exp(NORMAL_95 * deviation))
+    return (value / half, value * half), tuple(float(share) for share in shares)
