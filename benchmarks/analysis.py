@@ -32,7 +32,7 @@ from technic.loading import load
 from technic.parts.definition import FrameBody
 from technic.rigidity.eigen import elastic_modes
 from technic.rigidity.kinematics import component_motions, kinematics
-from technic.system.assemble import assemble
+from technic.system.assemble import assemble, element_of
 from technic.system.inverse import single_thread
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -64,7 +64,7 @@ def refined(unknowns: int):
             for p in model.parts
         )
         finer = replace(model, parts=parts)
-        size = assemble(finer).size
+        size = assemble(finer, element=element_of).size
         if size > unknowns:
             low = stretch
         else:
@@ -75,7 +75,7 @@ def refined(unknowns: int):
 def eigen_seconds(unknowns: int) -> dict[str, float]:
     """Time the lowest modes, sparse and dense, and compare their values."""
     model = refined(unknowns)
-    system = assemble(model)
+    system = assemble(model, element=element_of)
     kin = kinematics(model)
     found = component_motions(kin, 0)
     scale = sparse.diags_array(np.tile(kin.units, len(found.parts)))
