@@ -1,18 +1,18 @@
 """Which gears of a model mesh: found from their teeth and where they stand.
 
-LEGO gears have a module of 1 mm: a gear of n teeth rolls on a circle of n / 2 mm. Two gears on
-parallel shafts mesh when these circles touch; bevel gears when their shafts meet at a right angle and
-each circle reaches the other's; a worm when its own circle touches that of a gear on a crossing
-shaft; a rack when its teeth are at the height of the circle.
+Two gears on parallel shafts mesh when their rolling circles touch, a gear in a ring when they touch
+from inside; bevel gears when their shafts meet at a right angle and each circle reaches the other's; a
+worm when its own circle touches that of a gear on a crossing shaft; a rack when its rolling line does.
 
 A mesh holds one motion: the two sets of teeth cannot move through each other where they touch. That
 is one row of the joint matrix, whatever carries the gears, so planetary gears come out right, too.
-A worm pushes the teeth along its shaft, and cannot be turned by them: the gear is locked.
+A worm pushes the teeth along its shaft, and cannot be turned by them: the gear is locked. The worm's
+own shaft is as free as before.
 """
 
 from __future__ import annotations
 
-import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -25,77 +25,39 @@ from technic.assembly.model import Finding, FindingKind, Joint, Part
 from technic.assembly.stiffness import StiffnessTable
 from technic.geometry import Array, axes_from
 from technic.groups import connected_groups
-from technic.parts.definition import Port, PortKind
-from technic.units import LDU, MM
+from technic.ldraw.teeth import Gear, gears_of
+from technic.parts.teeth import Toothing
+from technic.units import LDU
 
-__all__ = [
-    "Gear",
-    "Mesh",
-    "coupled",
-    "find_meshes",
-    "gear_of",
-    "mesh_findings",
-    "mesh_joints",
-]
+__all__ = ["CONNECTION", "Mesh", "coupled", "find_meshes", "mesh_findings", "mesh_joints"]
 
 CONNECTION: Final = "gear/gear"
 """Key of the stiffness table."""
-
-MODULE: Final = 1.0 * MM
-"""Diameter per tooth (m)."""
-
-WORM_RADIUS: Final = 10.0 * LDU
-"""Rolling circle of the worm: it stands 20 LDU from an 8 tooth gear, 40 LDU from a 24 tooth gear."""
-
-KNOB_RADIUS: Final = 20.0 * LDU
-"""Knob wheels stand 40 LDU apart."""
 
 RADIAL: Final = 1.25 * LDU
 """Largest gap or overlap of rolling circles: half a tooth's share of the radius. Sums of teeth that
 occur differ by four teeth, 5 LDU. Gears whose shafts stand at a diagonal of the grid are placed up to
 half a millimetre off."""
 
-FACE: Final = 12.0 * LDU
-"""Furthest apart that the middles of two meshing gears are along their shafts: teeth are up to 20 LDU
-wide, and a half-stud shift leaves them 10 LDU of common width."""
+LOOSE: Final = 3.0 * LDU
+"""Largest gap where the grid leaves one: racks and crowns that stand 2.5 LDU from the circle that
+they roll on. Teeth are 5 LDU deep."""
 
-BEVEL_LOW, BEVEL_HIGH = -2.0 * LDU, 12.0 * LDU
-"""Bevel gears: how much further than the other's rolling circle the middle of a gear stands. Teeth
-end up to half a module before the middle of a gear 20 LDU wide; on the grid it is 5 LDU."""
+CONE_LOW, CONE_HIGH = -3.0 * LDU, 5.0 * LDU
+"""How far beside its place along the shaft a bevel gear may stand: less than half a grid step either
+way."""
+
+COMMON: Final = 2.0 * LDU
+"""Least width that teeth have in common."""
 
 SQUARE: Final = 0.02
 """Sine of the largest angle by which shafts may miss parallel or square (1.1 degrees)."""
 
-_TEETH: Final = re.compile(r"(\d+) tooth")
+RACK_WIDTH: Final = 10.0 * LDU
+"""Half the width of a rack's teeth."""
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Gear:
-    """Teeth in their place.
-
-    Parameters
-    ----------
-    part : int
-    kind : str
-        ``"spur"``, ``"bevel"``, ``"double bevel"``, ``"crown"``, ``"knob"``, ``"worm"`` or ``"rack"``.
-    teeth : int
-        0 for worms and racks.
-    center, axis : (3,) ndarray
-        Middle of the gear on its shaft (m) and the shaft's direction; of a rack the middle of its
-        box and the direction in which it moves.
-    radius : float
-        Of the rolling circle (m); 0 for a rack.
-    reach : float
-        Half the length of a worm or rack (m); 0 for others.
-    """
-
-    part: int
-    kind: str
-    teeth: int
-    center: Array
-    axis: Array
-    radius: float
-    reach: float = 0.0
+_CROSSING: Final = ("bevel", "double bevel", "crown", "knob")
+_ROUND: Final = ("spur", "double bevel", "crown")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,7 +67,7 @@ class Mesh:
     Parameters
     ----------
     kind : str
-        ``"spur"``, ``"bevel"``, ``"worm"`` or ``"rack"``.
+        ``"spur"``, ``"ring"``, ``"bevel"``, ``"worm"`` or ``"rack"``.
     gears : (Gear, Gear)
         In the order of their parts.
     point : (3,) ndarray
@@ -125,115 +87,86 @@ class Mesh:
         return self.gears[0].part, self.gears[1].part
 
 
-def gear_of(part: Part, index: int) -> Gear | None:
-    """Return the teeth of a part, or None when it has none; told by its title."""
-    if part.definition is None or part.fastener:
-        return None
-    title = part.definition.title.lower()
-    middle = part.mass_properties.centroid
-    if "rack" in title and "gear" in title:
-        moments, axes = np.linalg.eigh(part.mass_properties.inertia)
-        # of a uniform rod: I = m l^2 / 12
-        length = float(np.sqrt(12.0 * moments[1] / part.mass_properties.mass))
-        direction = part.pose.directions(axes[:, 0])
-        return Gear(index, "rack", 0, part.centroid, direction, 0.0, length / 2.0)
-    bore = _bore(part.ports, middle)
-    if bore is None:
-        return None
-    along = float((middle - bore.position) @ bore.axis)
-    if "worm" in title:
-        center = part.pose.points(bore.position + along * bore.axis)
-        ports = [p for p in part.ports if abs(float(p.axis @ bore.axis)) > 0.99]
-        ends = [float((p.position - bore.position) @ bore.axis) for p in ports]
-        reach = (max(ends) - min(ends)) / 2.0 + bore.length / 2.0
-        axis = part.pose.directions(bore.axis)
-        return Gear(index, "worm", 0, center, axis, WORM_RADIUS, reach)
-    kind, teeth, radius = "spur", 0, 0.0
-    if match := _TEETH.search(title):
-        if "gear" not in title and "differential" not in title:
-            return None
-        teeth = int(match[1])
-        radius = teeth * MODULE / 2.0
-        kind = next((k for k in ("double bevel", "bevel", "crown") if k in title), "spur")
-    elif "knob" in title and "gear" in title:
-        kind, teeth, radius = "knob", 4, KNOB_RADIUS
-    else:
-        return None
-    center = part.pose.points(bore.position + along * bore.axis)
-    return Gear(index, kind, teeth, center, part.pose.directions(bore.axis), radius)
-
-
-def _bore(ports: Sequence[Port], middle: Array) -> Port | None:
-    """Return the bore through the middle of a gear: an axle hole before a round one."""
-    best: tuple[float, int, Port] | None = None
-    for port in ports:
-        if port.kind not in (PortKind.AXLE_HOLE, PortKind.PIN_HOLE):
-            continue
-        off = float(np.linalg.norm(np.cross(middle - port.position, port.axis)))
-        if off > 2.0 * LDU:
-            continue
-        rank = (float(port.kind is PortKind.PIN_HOLE), len(ports))
-        if best is None or rank[0] < best[0]:
-            best = (rank[0], rank[1], port)
-    return None if best is None else best[2]
-
-
 def find_meshes(parts: Sequence[Part]) -> tuple[Mesh, ...]:
     """Return the gears in mesh, in the order of their parts."""
-    gears = [gear for k, part in enumerate(parts) if (gear := gear_of(part, k)) is not None]
+    gears = [gear for k, part in enumerate(parts) for gear in gears_of(part, k)]
     found = []
     for first, second in combinations(gears, 2):
-        reach = first.radius + second.radius + first.reach + second.reach + 40.0 * LDU
-        if float(np.linalg.norm(first.center - second.center)) > reach:
+        if first.part == second.part:
             continue
-        mesh = _mesh(first, second)
+        one, other = first.teeth, second.teeth
+        reach = one.radius + other.radius + one.half + other.half + 40.0 * LDU
+        if float(np.linalg.norm(one.center - other.center)) > reach:
+            continue
+        mesh = _mesh(one, other)
         if mesh is not None:
-            found.append(mesh)
+            kind, point, direction = mesh
+            found.append(Mesh(kind, (first, second), point, direction))
     return tuple(found)
-
-
-def _mesh(first: Gear, second: Gear) -> Mesh | None:
-    kinds = {first.kind, second.kind}
-    if "rack" in kinds or "worm" in kinds:
-        special, gear = (first, second) if first.kind in ("rack", "worm") else (second, first)
-        if gear.kind in ("rack", "worm", "knob", "bevel"):
-            return None
-        found = _rack(special, gear) if special.kind == "rack" else _worm(special, gear)
-        name = special.kind
-    elif len(kinds) > 1 and "knob" in kinds:
-        return None
-    elif float(np.linalg.norm(np.cross(first.axis, second.axis))) < SQUARE:
-        found, name = _parallel(first, second), "spur"
-    elif abs(float(first.axis @ second.axis)) < SQUARE:
-        found, name = _crossing(first, second), "bevel"
-    else:
-        return None
-    return None if found is None else Mesh(name, (first, second), *found)
 
 
 _Touch = tuple[Array, Array]
 """Where teeth touch, and in which direction they push."""
 
 
-def _parallel(first: Gear, second: Gear) -> _Touch | None:
-    if "bevel" in (first.kind, second.kind):
-        return None  # teeth on one side only, for crossing shafts
+def _mesh(first: Toothing, second: Toothing) -> tuple[str, Array, Array] | None:
+    """Return the kind of mesh, where the teeth touch and in which direction they push."""
+    if first.kind in ("rack", "worm") or second.kind in ("rack", "worm"):
+        special, gear = (first, second) if first.kind in ("rack", "worm") else (second, first)
+        if gear.kind not in _ROUND or gear.inner:
+            return None
+        found = _rack(special, gear) if special.kind == "rack" else _worm(special, gear)
+        name = special.kind
+    elif (first.kind == "knob") != (second.kind == "knob"):
+        return None
+    elif float(np.linalg.norm(np.cross(first.axis, second.axis))) < SQUARE:
+        found, name = _parallel(first, second)
+    elif abs(float(first.axis @ second.axis)) < SQUARE:
+        found, name = _crossing(first, second), "bevel"
+    else:
+        return None
+    return None if found is None else (name, *found)
+
+
+def _common(first: Toothing, second: Toothing, along: float) -> bool:
+    """Tell whether teeth have some width in common, their middles being `along` apart."""
+    return first.half + second.half - abs(along) >= COMMON
+
+
+def _toothed(teeth: Toothing, out: Array) -> bool:
+    """Tell whether there are teeth in a direction from the middle."""
+    if teeth.sector is None:
+        return True
+    return all(float(out @ end) > -SQUARE for end in teeth.sector)
+
+
+def _parallel(first: Toothing, second: Toothing) -> tuple[_Touch | None, str]:
+    if "bevel" in (first.kind, second.kind) or (first.inner and second.inner):
+        return None, ""  # teeth on one side only, for crossing shafts
+    # the ring is the first one, if there is one
+    if second.inner:
+        first, second = second, first
     between = second.center - first.center
     along = float(between @ first.axis)
     across = between - along * first.axis
     distance = float(np.linalg.norm(across))
-    if abs(along) > FACE or abs(distance - first.radius - second.radius) > RADIAL:
-        return None
+    if distance < RADIAL or not _common(first, second, along):
+        return None, ""
     out = across / distance
-    share = first.radius / (first.radius + second.radius)
-    point = first.center + along / 2.0 * first.axis + share * distance * out
-    return point, np.cross(first.axis, out)
+    rolling = first.radius - second.radius if first.inner else first.radius + second.radius
+    if abs(distance - rolling) > RADIAL:
+        return None, ""
+    if not _toothed(first, out) or not _toothed(second, out if first.inner else -out):
+        return None, ""
+    # where the circles touch; a gap between them is shared in the ratio of the radii
+    share = first.radius / rolling * distance
+    point = first.center + along / 2.0 * first.axis + share * out
+    return (point, np.cross(first.axis, out)), "ring" if first.inner else "spur"
 
 
-def _crossing(first: Gear, second: Gear) -> _Touch | None:
-    if not all(g.kind in ("bevel", "double bevel", "crown", "knob") for g in (first, second)) and (
-        "crown" not in (first.kind, second.kind)
-    ):
+def _crossing(first: Toothing, second: Toothing) -> _Touch | None:
+    kinds = (first.kind, second.kind)
+    if first.inner or second.inner:
         return None
     # Where the shafts meet, seen from each gear: s1 and s2 along its own shaft.
     between = second.center - first.center
@@ -241,10 +174,17 @@ def _crossing(first: Gear, second: Gear) -> _Touch | None:
     if abs(float(between @ normal)) > RADIAL:
         return None
     s1, s2 = float(between @ first.axis), -float(between @ second.axis)
-    for distance, other in ((abs(s1), second), (abs(s2), first)):
-        low, high = (-RADIAL, RADIAL) if other.kind == "knob" else (BEVEL_LOW, BEVEL_HIGH)
-        if not low <= distance - other.radius <= high:
+    if "crown" in kinds:
+        crown = kinds.index("crown")
+        if kinds[1 - crown] not in _ROUND:
             return None
+        pair = ((first, s1), (second, s2))
+        if not _crown(*pair[crown], *pair[1 - crown]):
+            return None
+    elif not all(kind in _CROSSING for kind in kinds) or not (
+        _reaches(first, s1, second) and _reaches(second, s2, first)
+    ):
+        return None
     meet = first.center + s1 * first.axis
     # On the cone of each: as far from a shaft as that gear's rolling circle is wide.
     point = (
@@ -253,7 +193,19 @@ def _crossing(first: Gear, second: Gear) -> _Touch | None:
     return point, normal / np.linalg.norm(normal)
 
 
-def _worm(worm: Gear, gear: Gear) -> _Touch | None:
+def _reaches(gear: Toothing, crossing: float, other: Toothing) -> bool:
+    """Tell whether a bevel stands so that its rolling circle touches the other's."""
+    low, high = (-RADIAL, RADIAL) if other.kind == "knob" else (CONE_LOW, CONE_HIGH)
+    return any(low <= (crossing - at) * way - other.radius <= high for at, way in gear.faces)
+
+
+def _crown(crown: Toothing, crossing: float, gear: Toothing, other: float) -> bool:
+    """Tell whether a gear's teeth stand in those of a crown: over them, and as far out."""
+    over = any(-RADIAL <= (crossing - at) * way - gear.radius <= LOOSE for at, way in crown.faces)
+    return over and _common(crown, gear, abs(other) - crown.radius)
+
+
+def _worm(worm: Toothing, gear: Toothing) -> _Touch | None:
     if abs(float(worm.axis @ gear.axis)) > SQUARE:
         return None
     between = gear.center - worm.center
@@ -262,24 +214,28 @@ def _worm(worm: Gear, gear: Gear) -> _Touch | None:
     height = float(between @ normal)
     if abs(abs(height) - worm.radius - gear.radius) > RADIAL:
         return None
-    if abs(float(between @ gear.axis)) > FACE or abs(float(between @ worm.axis)) > worm.reach:
+    # A thread is as wide as its own circle lets it be where the gear's teeth pass.
+    if abs(float(between @ gear.axis)) > gear.half + worm.radius - COMMON:
         return None
-    # On the worm's own axis: turning the worm does not count, only where it stands.
-    return gear.center - height * normal, worm.axis
+    if abs(float(between @ worm.axis)) > worm.half:
+        return None
+    # Where the thread pushes along the shaft, a worm's own turning has no speed.
+    return gear.center - np.sign(height) * gear.radius * normal, worm.axis
 
 
-def _rack(rack: Gear, gear: Gear) -> _Touch | None:
-    if abs(float(rack.axis @ gear.axis)) > SQUARE:
+def _rack(rack: Toothing, gear: Toothing) -> _Touch | None:
+    assert rack.out is not None  # every rack of the table has it
+    across = np.cross(rack.axis, rack.out)
+    if abs(float(across @ gear.axis)) < 1.0 - SQUARE**2:
         return None
     between = gear.center - rack.center
-    normal = np.cross(rack.axis, gear.axis)
-    normal = normal / np.linalg.norm(normal)
-    height = float(between @ normal)
-    if not BEVEL_LOW <= abs(height) - gear.radius <= BEVEL_HIGH:
+    gap = float(between @ rack.out) - gear.radius
+    if not -RADIAL <= gap <= LOOSE or abs(float(between @ rack.axis)) > rack.half:
         return None
-    if abs(float(between @ gear.axis)) > FACE or abs(float(between @ rack.axis)) > rack.reach:
+    if abs(float(between @ across)) > RACK_WIDTH + gear.half - COMMON:
         return None
-    return gear.center - np.sign(height) * gear.radius * normal, rack.axis
+    # On the gear's rolling circle, which rolls on the rack's line whatever the gap.
+    return gear.center - gear.radius * rack.out, rack.axis
 
 
 def mesh_joints(
@@ -289,9 +245,14 @@ def mesh_joints(
     entry = table.get(CONNECTION)
     held = np.array(HELD[JointType.MESH])
     stiffness = np.where(held, entry.vector(), 0.0)
+    names = [f"{parts[m.parts[0]].id}~{parts[m.parts[1]].id}@{m.kind}" for m in meshes]
+    again = Counter[str]()
+    for k, name in enumerate(names):
+        again[name] += 1
+        names[k] += str(again[name]) if again[name] > 1 else ""
     return tuple(
         Joint(
-            id=f"{parts[mesh.parts[0]].id}~{parts[mesh.parts[1]].id}@{mesh.kind}",
+            id=name,
             type=JointType.MESH,
             parts=mesh.parts,
             point=mesh.point,
@@ -301,7 +262,7 @@ def mesh_joints(
             connection=CONNECTION,
             provenance=entry.provenance(held),
         )
-        for mesh in meshes
+        for name, mesh in zip(names, meshes, strict=True)
     )
 
 
@@ -311,8 +272,8 @@ def coupled(joints: Sequence[Joint]) -> tuple[Joint, ...]:
     Teeth hold gears in one direction only as long as something else keeps them at their distance: a
     mesh between pieces that nothing else joins is left out, and so is one inside a rigid piece.
     """
-    meshes = [joint for joint in joints if joint.type is JointType.MESH]
-    others = [joint for joint in joints if joint.type is not JointType.MESH]
+    meshes = [joint for joint in joints if joint.connection == CONNECTION]
+    others = [joint for joint in joints if joint.connection != CONNECTION]
     ends = sorted({part for joint in joints for part in joint.parts})
     piece = _pieces(ends, others)
     fixed = _pieces(ends, [joint for joint in others if joint.held.all()])
@@ -346,7 +307,7 @@ def _sentence(parts: Sequence[Part], mesh: Mesh, joined: set[tuple[int, int]] | 
         part = parts[gear.part]
         where = "" if part.source is None else f", line {part.source.line}"
         names.append(f"{part.name} ({part.number}{where})")
-    first, second = mesh.gears
+    first, second = (gear.teeth for gear in mesh.gears)
     ratio = f", {first.teeth} : {second.teeth} teeth" if first.teeth and second.teeth else ""
     end = (
         ""
@@ -354,8 +315,10 @@ def _sentence(parts: Sequence[Part], mesh: Mesh, joined: set[tuple[int, int]] | 
         else "; nothing keeps them together: not coupled"
     )
     if mesh.kind == "worm":
-        ratio = ", which locks the gear"
-    word = {"spur": "meshes with", "bevel": "meshes at a right angle with"}.get(
-        mesh.kind, "is in the teeth of"
-    )
+        ratio = ", which locks the gear; the worm's own shaft turns it by a tooth a turn"
+    word = {
+        "spur": "meshes with",
+        "ring": "meshes inside with",
+        "bevel": "meshes at a right angle with",
+    }.get(mesh.kind, "is in the teeth of")
     return f"{names[0]} {word} {names[1]}{ratio}{end}"

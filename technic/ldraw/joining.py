@@ -10,12 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from technic.assembly.joint_types import JointType
 from technic.assembly.model import Assembly, Finding, FindingKind, Joining, Joint, Part
 from technic.assembly.overrides import apply_overrides, by_user
 from technic.assembly.stiffness import default_table
 from technic.ldraw.connect import Links, findings_of, link
-from technic.ldraw.gears import coupled, find_meshes, mesh_findings, mesh_joints
+from technic.ldraw.gears import CONNECTION, coupled, find_meshes, mesh_findings, mesh_joints
 
 __all__ = ["INSIDE", "join", "rejoin"]
 
@@ -53,8 +52,8 @@ def join(assembly: Assembly, joining: Joining, *, again: bool = False) -> Assemb
         )
     else:
         changed = linked(everything)
-    joints = tuple(joint for joint in changed.joints if joint.type is not JointType.MESH)
-    left = {joint.parts for joint in changed.joints if joint.type is JointType.MESH}
+    joints = tuple(joint for joint in changed.joints if joint.connection != CONNECTION)
+    left = {joint.parts for joint in changed.joints if joint.connection == CONNECTION}
     meshes = [mesh for mesh in find_meshes(changed.parts) if mesh.parts in left]
     holding = coupled(changed.joints) if joining.gears == "on" else None
     return replace(

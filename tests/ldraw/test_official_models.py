@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 
 from technic.assembly.model import Assembly, FindingKind
 from technic.groups import connected_groups
+from technic.ldraw.gears import find_meshes
 from technic.ldraw.library import Library
 from technic.ldraw.reader import load_ldraw
 from technic.ldraw.shadow import ShadowLibrary
 from technic.rigidity.kinematics import component_motions, kinematics
+from technic.units import LDU
 
 pytestmark = pytest.mark.slow
 
@@ -110,3 +113,49 @@ def test_models_run_without_a_library(model, name):
     assert assembly.imported is not None
     assert not assembly.imported.library
     assert not assembly.imported.from_library
+
+
+MESHES = {
+    "omr_42020_twin_rotor.mpd": [
+        ("bevel", "32270", "6589"),
+        ("bevel", "6589", "32270"),
+    ],
+    # The turntable of 28 teeth is turned by the gear of 20, which an earlier count (3) left out.
+    "omr_42004_mini_backhoe.mpd": [
+        ("spur", "32269", "32270"),
+        ("spur", "99010", "32269"),
+        ("worm", "4716", "10928"),
+        ("worm", "4716", "10928"),
+    ],
+    "fll_robot.mpd": [("bevel", "32072", "32072")],
+    # two folding wings, each with a worm between two pairs of gears
+    "omr_10212_imperial_shuttle.mpd": [
+        *[("bevel", "32270", "32269")] * 4,
+        *[("spur", "3648b", "3649")] * 4,
+        *[("worm", "4716", "3648b")] * 4,
+    ],
+}
+"""Every mesh of the shared models; all others have none."""
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_meshes_are_those_that_are_there(model, library, name):
+    parts = load_ldraw(model(name), library=library).parts
+    meshes = find_meshes(parts)
+    found = sorted((m.kind, *(parts[k].number for k in m.parts)) for m in meshes)
+    assert found == sorted(MESHES.get(name, []))
+    for mesh in meshes:
+        # shafts stand exactly as far apart as the rolling circles want it
+        one, two = (gear.teeth for gear in mesh.gears)
+        between = two.center - one.center
+        if mesh.kind == "bevel":
+            place = max((-(between @ two.axis) - at) * way for at, way in two.faces)
+            wanted = one.radius
+        else:
+            across = np.cross(one.axis, two.axis)
+            if mesh.kind == "spur":
+                across = between - (between @ one.axis) * one.axis
+                across /= np.linalg.norm(across)
+            place = abs(between @ across)
+            wanted = one.radius + two.radius
+        assert place == pytest.approx(wanted, abs=0.05 * LDU)
