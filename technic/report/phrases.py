@@ -15,8 +15,14 @@ _SENTENCE = 320
 """Letters of a motion's sentence: in a big mechanism dozens of parts follow one another."""
 
 _ORDERS = {
-    "finite": "A real mechanism: it keeps moving",
-    "first-order": "Shaky: moves a little through pin play, not a mechanism",
+    ("finite", None): "A real mechanism: it keeps moving",
+    ("first-order", None): "Shaky: moves a little through pin play, not a mechanism",
+    ("first-order", "stiffens"): (
+        "Shaky: moves a little through pin play and stiffens at once, not a mechanism"
+    ),
+    ("first-order", "undecided"): (
+        "Shaky: moves a little through pin play, not a mechanism (the second-order test does not decide)"
+    ),
 }
 
 FINDING_WORDS = {
@@ -48,7 +54,9 @@ def motion_words(report: RigidityReport, motion: Motion) -> str:
     if kept < len(clauses):
         clauses[kept:] = ["and others with them, see --json"]
     # That a wheel keeps spinning goes without saying.
-    order = _ORDERS.get(motion.order or "") if motion.kind is MotionKind.STRUCTURAL else None
+    order = None
+    if motion.kind is MotionKind.STRUCTURAL:
+        order = _ORDERS.get((motion.order or "", motion.second_order))
     return "; ".join(clauses) + (f". {order}." if order else ".")
 
 

@@ -17,9 +17,21 @@ from scipy.sparse import linalg as sparse_linalg
 from technic.assembly.joint_types import JointType
 from technic.assembly.model import Assembly
 from technic.geometry import Array, Pose, rotation_matrix, rotation_vector, skew
-from technic.rigidity.kinematics import Kinematics, merge_fixed
+from technic.rigidity.kinematics import Kinematics, merge_fixed, needed_links
 
-__all__ = ["Placement", "close_joints", "placed_assembly", "step"]
+__all__ = [
+    "Links",
+    "Placement",
+    "body_links",
+    "close_joints",
+    "jacobian",
+    "joint_gaps",
+    "link_arrays",
+    "link_sides",
+    "placed_assembly",
+    "start",
+    "step",
+]
 
 CLOSED = 1e-9
 """Joints are closed when no held motion is off by more than this (scaled lengths, radians)."""
@@ -55,8 +67,22 @@ class Placement:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Links:
-    """Joints and supports of a component as arrays: side 0 and 1 (for supports the ground)."""
+class Links:
+    """Joints and supports of a component as arrays: side 0 and 1 (for supports the ground).
+
+    Parameters
+    ----------
+    parts : (n, 2) ndarray of int
+        Number of the body on either side; -1 for the ground.
+    points : (n, 3) ndarray
+        In the world (m).
+    axes : (n, 3, 3) ndarray
+        Rows: the axes of the link in the world.
+    arms : (n, 2, 3) ndarray
+        From the body's reference point, or the world's origin, to the point (m).
+    held : (n, 6) ndarray of bool
+    universal : (n,) ndarray of bool
+    """
 
     parts: NDArray[np.int64]
     points: Array
@@ -79,9 +105,9 @@ def step(placement: Placement, twists: Array) -> Placement:
     )
 
 
-def _links(
+def link_arrays(
     kin: Kinematics, bodies: tuple[int, ...], links: list[int], place: dict[int, int]
-) -> _Links:
+) -> Links:
     """Return links as arrays; `place` says which of the bodies, given by a part each, a part is of."""
     joints, supports = kin.assembly.joints, kin.assembly.supports
     count = len(joints)
@@ -99,10 +125,36 @@ def _links(
             points[row] = kin.origins[support.part] if support.point is None else support.point
     origins = kin.origins[list(bodies)]
     arms = points[:, None, :] - np.where(owner[..., None] < 0, 0.0, origins[owner])
-    return _Links(owner, points, axes, arms, kin.held[links], universal)
+    return Links(owner, points, axes, arms, kin.held[links], universal)
 
 
-def _sides(links: _Links, placement: Placement) -> tuple[Array, Array]:
+def body_links(
+    kin: Kinematics, parts: tuple[int, ...], links: list[int]
+) -> tuple[tuple[int, ...], NDArray[np.int64], Links]:
+    """Return the links between bodies: parts fixed to each other are one; links that follow from others
+    are left out.
+
+    Returns
+    -------
+    bodies : tuple of int
+        The part that stands for each body, sorted.
+    body : (n,) ndarray of int
+        Body of each part.
+    links : Links
+    """
+    heads = merge_fixed(kin, parts, links)
+    bodies = tuple(sorted(set(heads.values())))
+    number = {h: k for k, h in enumerate(bodies)}
+    place = {p: number[heads[p]] for p in parts}
+    outer = [
+        k
+        for k in needed_links(kin, links)
+        if len({place[p] for p in kin.owners[k]}) == len(kin.owners[k])
+    ]
+    return bodies, np.array([place[p] for p in parts]), link_arrays(kin, bodies, outer, place)
+
+
+def link_sides(links: Links, placement: Placement) -> tuple[Array, Array]:
     """Return points (links, 2, 3) and axes (links, 2, 3, 3) of both sides; the ground stays."""
     ground = links.parts < 0
     turns = np.where(ground[..., None, None], np.eye(3), placement.turns[links.parts])
@@ -112,9 +164,9 @@ def _sides(links: _Links, placement: Placement) -> tuple[Array, Array]:
     return points, axes
 
 
-def _gaps(links: _Links, placement: Placement, length: float) -> Array:
+def joint_gaps(links: Links, placement: Placement, length: float) -> Array:
     """Return the six relative motions of every link, scaled, exact for finite motions."""
-    points, axes = _sides(links, placement)
+    points, axes = link_sides(links, placement)
     out = np.zeros((len(links.parts), 6))
     # axes of side 1, because that is the ground for supports
     out[:, :3] = np.einsum("kac,kc->ka", axes[:, 1], points[:, 0] - points[:, 1]) / length
@@ -122,14 +174,15 @@ def _gaps(links: _Links, placement: Placement, length: float) -> Array:
     out[:, 3:] = rotation_vector(relative)
     # a universal joint keeps its two axes at the angle they had, whatever it turns about them
     cross = np.einsum("kc,kc->k", axes[:, 0, 1], axes[:, 1, 2])
-    out[links.universal, 3] = -cross[links.universal]
+    out[links.universal, 3] = cross[links.universal]
     return out
 
 
-def _jacobian(
-    links: _Links, placement: Placement, length: float, dofs: NDArray[np.int64]
+def jacobian(
+    links: Links, placement: Placement, length: float, dofs: NDArray[np.int64]
 ) -> sparse.csr_array:
-    points, axes = _sides(links, placement)
+    """Return the derivative of the held gaps with respect to scaled twists, one row per held motion."""
+    points, axes = link_sides(links, placement)
     width = len(dofs)
     index = np.cumsum(links.held.ravel()).reshape(links.held.shape) - 1
     e = axes[:, 1]
@@ -161,18 +214,12 @@ def close_joints(
     Placement or None
         None when the joints could not be closed.
     """
-    heads = merge_fixed(kin, parts, links)
-    bodies = tuple(sorted(set(heads.values())))
-    number = {h: k for k, h in enumerate(bodies)}
-    body = np.array([number[heads[p]] for p in parts])
-    owners = {p: int(b) for p, b in zip(parts, body, strict=True)}
-    outer = [k for k in links if len({owners[p] for p in kin.owners[k]}) == len(kin.owners[k])]
-    arrays = _links(kin, bodies, outer, owners)
-    first = np.array([parts.index(h) for h in bodies])
+    bodies, body, arrays = body_links(kin, parts, links)
+    first = np.searchsorted(parts, bodies)
     here = _close(
         kin,
         arrays,
-        _gaps(arrays, start(kin, bodies), kin.length),
+        joint_gaps(arrays, start(kin, bodies), kin.length),
         Placement(moved.origins[first], moved.turns[first]),
     )
     if here is None:
@@ -182,18 +229,18 @@ def close_joints(
     return Placement(here.origins[body] + np.einsum("kij,kj->ki", turns, arms), turns)
 
 
-def _close(kin: Kinematics, arrays: _Links, target: Array, moved: Placement) -> Placement | None:
+def _close(kin: Kinematics, arrays: Links, target: Array, moved: Placement) -> Placement | None:
     """Return the placement near `moved` in which the gaps of all joints are those of `target`."""
     dofs = kin.dofs
     here = moved
     before = np.inf
     for _ in range(ITERATIONS):
-        gaps = (_gaps(arrays, here, kin.length) - target)[arrays.held]
+        gaps = (joint_gaps(arrays, here, kin.length) - target)[arrays.held]
         widest = float(np.abs(gaps).max(initial=0.0))
         if widest < CLOSED or NEARLY * CLOSED > widest > STALLED * before:
             return here
         before = widest
-        j = _jacobian(arrays, here, kin.length, dofs)
+        j = jacobian(arrays, here, kin.length, dofs)
         normal = sparse.csc_array(j.T @ j)
         damping = DAMPING * float(normal.diagonal().max())
         matrix = sparse.csc_array(normal + damping * sparse.eye_array(normal.shape[0]))
@@ -209,7 +256,7 @@ def _close(kin: Kinematics, arrays: _Links, target: Array, moved: Placement) -> 
         twists = np.zeros((len(here.origins), 6))
         twists[:, dofs] = factor.solve(-(j.T @ gaps)).reshape(len(twists), -1)
         here = step(here, twists * kin.units)
-    gaps = (_gaps(arrays, here, kin.length) - target)[arrays.held]
+    gaps = (joint_gaps(arrays, here, kin.length) - target)[arrays.held]
     return here if np.abs(gaps).max(initial=0.0) < NEARLY * CLOSED else None
 
 
@@ -217,8 +264,8 @@ def placed_assembly(
     kin: Kinematics, parts: tuple[int, ...], links: list[int], placement: Placement
 ) -> Assembly:
     """Return the assembly with a component moved to a placement; other components stay."""
-    arrays = _links(kin, parts, links, {p: k for k, p in enumerate(parts)})
-    points, axes = _sides(arrays, placement)
+    arrays = link_arrays(kin, parts, links, {p: k for k, p in enumerate(parts)})
+    points, axes = link_sides(arrays, placement)
     new_parts = list(kin.assembly.parts)
     for k, p in enumerate(parts):
         old = new_parts[p].pose

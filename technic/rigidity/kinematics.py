@@ -21,7 +21,14 @@ from technic.rigidity.nullspace import Block, NullSpace, null_space
 from technic.system.rows import transfer
 from technic.tolerances import MOBILITY_CUT, MOBILITY_LENGTH
 
-__all__ = ["ComponentMotions", "Kinematics", "component_motions", "kinematics", "merge_fixed"]
+__all__ = [
+    "ComponentMotions",
+    "Kinematics",
+    "component_motions",
+    "kinematics",
+    "merge_fixed",
+    "needed_links",
+]
 
 PLANE = np.array([0, 1, 5])
 """Unknowns of a twist that stay in the plane z = 0."""
@@ -231,7 +238,7 @@ def _rows(
         Twist of the body's head -> twist of the part.
     """
     blocks: list[Block] = []
-    needed = _needed(kin, links)
+    needed = needed_links(kin, links)
     for count in (2, 1):
         chosen = [k for k in needed if len(kin.owners[k]) == count]
         if not chosen:
@@ -245,7 +252,7 @@ def _rows(
     return blocks
 
 
-def _needed(kin: Kinematics, links: list[int]) -> list[int]:
+def needed_links(kin: Kinematics, links: list[int]) -> list[int]:
     """Leave out joints that follow from others: of parts joined pairwise at one place in the same way, a
     chain is enough.
     """

@@ -7,7 +7,7 @@ that each motion moves as few clusters as possible.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -86,8 +86,14 @@ def sort_motions(kin: Kinematics, motions: ComponentMotions, component: int) -> 
     spinning, sliding = kept[MotionKind.SPINNING], kept[MotionKind.SLIDING]
     idle = motions.internal - len(structural) - spinning - sliding
     out = [
-        _motion(kin, component, MotionKind.STRUCTURAL, clusters, space.of_clusters(vector), order)
-        for vector, order in structural
+        replace(
+            _motion(
+                kin, component, MotionKind.STRUCTURAL, clusters, space.of_clusters(found.vector)
+            ),
+            order=found.order,
+            second_order=found.second_order,
+        )
+        for found in structural
     ]
     for train in trains:
         out.append(_motion(kin, component, train.kind, list(train.clusters), train.twists))
@@ -147,7 +153,6 @@ def _motion(
     kind: MotionKind,
     clusters: list[Cluster],
     twists: Array,
-    order: str | None = None,
 ) -> Motion:
     """Turn twists of clusters into a record: parts, type, axis, freeing joints."""
     parts: list[int] = []
@@ -173,7 +178,6 @@ def _motion(
         axis_point=shape.point,
         axis_direction=shape.direction,
         pitch=shape.pitch,
-        order=order,
         component=component,
     )
 

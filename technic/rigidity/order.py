@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from technic.geometry import Array, shift_twist
@@ -12,13 +14,17 @@ from technic.rigidity.kinematics import (
     component_motions,
     kinematics,
 )
+from technic.rigidity.second_order import second_order
 from technic.rigidity.structural import StructuralSpace, cluster_field, sparse_basis
 from technic.tolerances import MOBILITY_CUT, MOTION_KIND_CUT
 
-__all__ = ["FINITE", "FIRST_ORDER", "split_by_order"]
+__all__ = ["FINITE", "FIRST_ORDER", "STIFFENS", "UNDECIDED", "OrderedMotion", "split_by_order"]
 
 FINITE = "finite"
 FIRST_ORDER = "first-order"
+
+STIFFENS = "stiffens"
+UNDECIDED = "undecided"
 
 STEPS = (0.2, 0.05)
 """How far the part that goes furthest is moved (scaled: 8 LDU, or 0.2 rad): far enough that what stiffens
@@ -38,36 +44,69 @@ TRIALS = 3
 """Random directions tried: where several paths leave one configuration, the one of most freedom counts."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class OrderedMotion:
+    """A structural motion.
+
+    Parameters
+    ----------
+    vector : (bodies, 6) ndarray
+        Scaled twists in the structural space.
+    order : str
+        "finite" or "first-order".
+    second_order : str or None
+        Of a first-order motion: "stiffens" when a self-stress resists it, "undecided" when none does; None
+        when the test was not made.
+    """
+
+    vector: Array
+    order: str
+    second_order: str | None = None
+
+
 def split_by_order(
     kin: Kinematics, motions: ComponentMotions, component: int, space: StructuralSpace
-) -> list[tuple[Array, str]]:
+) -> list[OrderedMotion]:
     """Return a readable basis of the structural motions with the order of each.
 
     Returns
     -------
-    list of (vector, order)
+    list of OrderedMotion
         As many as `space` has dimensions; "finite" ones span what can really move.
     """
     bodies = len(space.bodies)
     if space.size == 0:
         return []
     readable = sparse_basis(space.basis, bodies, space.simple)
-    finite = _finite_directions(kin, motions, component, space)
+    test = second_order(kin, motions, component, space)
+    if test is not None and test.independent:
+        return [OrderedMotion(v, FINITE) for v in readable]
+    if test is not None and test.unblocked.shape[1] == 0:
+        finite = np.zeros((len(space.basis), 0))
+    else:
+        finite = _finite_directions(kin, motions, component, space)
     count = finite.shape[1]
     if count == space.size:
-        return [(v, FINITE) for v in readable]
+        return [OrderedMotion(v, FINITE) for v in readable]
+
+    def shaking(vector: Array) -> OrderedMotion:
+        if test is None:
+            return OrderedMotion(vector, FIRST_ORDER)
+        resisted = test.stiffens(space.basis.T @ vector.ravel())
+        return OrderedMotion(vector, FIRST_ORDER, STIFFENS if resisted else UNDECIDED)
+
     if count == 0:
-        return [(v, FIRST_ORDER) for v in readable]
+        return [shaking(v) for v in readable]
     taken, _ = np.linalg.qr(finite)
     outside = space.simple - taken @ (taken.T @ space.simple)
     simple = space.simple[:, np.linalg.norm(outside, axis=0) < MOTION_KIND_CUT]
-    out = [(v, FINITE) for v in sparse_basis(taken, bodies, simple)]
+    out = [OrderedMotion(v, FINITE) for v in sparse_basis(taken, bodies, simple)]
     for vector in readable:
         flat = vector.ravel() / np.linalg.norm(vector)
         for _ in range(2):
             flat = flat - taken @ (taken.T @ flat)
         if len(out) < space.size and np.linalg.norm(flat) > MOTION_KIND_CUT:
-            out.append((vector, FIRST_ORDER))
+            out.append(shaking(vector))
             taken = np.column_stack([taken, flat / np.linalg.norm(flat)])
     return out
 

@@ -107,6 +107,9 @@ class Motion:
         Advance of a screw per radian (m).
     order : str or None
         "finite", "first-order", or None when not examined.
+    second_order : str or None
+        Of a first-order motion: "stiffens" when forces in the joints that balance each other resist it,
+        "undecided" when none do, None when not examined.
     component : int
     sentence : str
         The motion in the builders' words.
@@ -121,6 +124,7 @@ class Motion:
     axis_direction: Array | None = None
     pitch: float = 0.0
     order: str | None = None
+    second_order: str | None = None
     component: int = 0
     sentence: str = ""
 

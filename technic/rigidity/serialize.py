@@ -143,6 +143,7 @@ def _motion(assembly: Assembly, motion: Motion) -> dict[str, Any]:
     return {
         "kind": motion.kind.value,
         "order": motion.order,
+        "second_order": motion.second_order,
         "type": motion.type.value,
         "axis": axis,
         "pitch_mm_per_rad": motion.pitch / MM,
