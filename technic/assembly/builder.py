@@ -137,6 +137,7 @@ class Linkage:
         axis2: ArrayLike | None = None,
         stiffness: Stiffness = None,
         jitter: Mapping[str, float] | None = None,
+        connection: str | None = None,
         id: str | None = None,  # noqa: A002 - the key's name in the file
     ) -> None:
         """Add a joint of any type between two parts, or pairwise between more."""
@@ -149,6 +150,8 @@ class Linkage:
             row["stiffness"] = stiffness if isinstance(stiffness, str) else dict(stiffness)
         if jitter is not None:
             row["jitter"] = dict(jitter)
+        if connection is not None:
+            row["connection"] = connection
         if id is not None:
             row["id"] = id
         self._data["joints"].append(row)

@@ -24,10 +24,13 @@ from technic.system.assemble import assemble
 from technic.system.parameters import Parameter
 from technic.system.part_models import FACTORIES, PartModel
 
-__all__ = ["FACTOR", "Confidence", "Uncertainty", "confidences", "uncertainty_of"]
+__all__ = ["FACTOR", "RANK_SURE", "Confidence", "Uncertainty", "confidences", "uncertainty_of"]
 
 FACTOR: Final = 2.0
 """Assumed 95 % bounds of a stiffness that nobody measured: half and double."""
+
+RANK_SURE: Final = 0.95
+"""A suggestion's rank is stable when it beats the next one with at least this probability."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,13 +85,13 @@ def uncertainty_of(table: StiffnessTable, connections: Sequence[str]) -> Uncerta
     ----------
     table : StiffnessTable
     connections : sequence of str
-        Keys of the table that the joints of the model name.
+        What the joints of the model are called, keys of the table or not.
     """
-    if table.measured:
+    known = set(connections)
+    if any(connection in known for connection, _ in table.measured):
         names = tuple(Parameter(*name) for name in table.measured)
         return Uncertainty("calibration", names, table.log_covariance)
-    known = sorted(set(connections) & set(table.connections))
-    names = tuple(Parameter(c, motion) for c in known for motion in SLOTS)
+    names = tuple(Parameter(c, motion) for c in sorted(known) for motion in SLOTS)
     deviation = log(FACTOR) / NORMAL_95
     return Uncertainty("assumed", names, deviation**2 * np.eye(len(names)))
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any
 
-from technic.design.confidence import Confidence
+from technic.design.confidence import RANK_SURE, Confidence
 from technic.design.filters import needs
 from technic.design.suggest import Suggestion, Suggestions
 from technic.ldraw.write import NewPart
@@ -16,7 +16,7 @@ from technic.report.suggest_text import cure_words
 from technic.rigidity.result import RigidityReport
 from technic.units import LDU, MM
 
-__all__ = ["SCHEMA", "suggestions_dict"]
+__all__ = ["SCHEMA", "confidence_dict", "state_dict", "suggestions_dict"]
 
 SCHEMA = "technic-suggestions/1"
 
@@ -43,7 +43,7 @@ def suggestions_dict(answers: Sequence[Suggestions], *, sequence: bool) -> dict[
         "schema": SCHEMA,
         "source": {key: source.get(key) for key in ("path", "sha256", "format")},
         "kind": "sequence" if sequence else "alternatives",
-        "before": None if before is None else _state(before),
+        "before": None if before is None else state_dict(before),
         "places": sum(a.places for a in answers),
         "refused": {
             reason: sum(a.refused[reason] for a in answers)
@@ -60,7 +60,7 @@ def suggestions_dict(answers: Sequence[Suggestions], *, sequence: bool) -> dict[
     }
 
 
-def _state(report: RigidityReport) -> dict[str, Any]:
+def state_dict(report: RigidityReport) -> dict[str, Any]:
     full = report.to_dict()
     return {key: full[key] for key in ("verdict", "mobility", "rigidity")}
 
@@ -77,7 +77,7 @@ def _new_part(part: NewPart) -> dict[str, Any]:
     }
 
 
-def _confidence(sure: Confidence | None) -> dict[str, Any] | None:
+def confidence_dict(sure: Confidence | None) -> dict[str, Any] | None:
     if sure is None:
         return None
     return {
@@ -86,6 +86,7 @@ def _confidence(sure: Confidence | None) -> dict[str, Any] | None:
         "factor_95": None if sure.factor_95 is None else list(sure.factor_95),
         "probability_it_helps": sure.helps,
         "probability_it_beats_the_next": sure.beats_next,
+        "rank_stable": None if sure.beats_next is None else sure.beats_next >= RANK_SURE,
     }
 
 
@@ -116,15 +117,15 @@ def _suggestion(before: RigidityReport, suggestion: Suggestion, rank: int) -> di
         "predicted_n_per_m": forecast if isfinite(forecast) else None,
         "predicted_motions_removed": suggestion.forecast.removed,
         "reanalyzed_n_per_m": None if after.rigidity is None else after.rigidity.value,
-        "confidence": _confidence(suggestion.confidence),
+        "confidence": confidence_dict(suggestion.confidence),
         "factor": suggestion.factor,
-        "after": _state(after),
+        "after": state_dict(after),
         "twins": suggestion.twins,
         "pair": None
         if suggestion.pair is None
         else {
             "new_parts": [_new_part(part) for part in suggestion.pair.change.added],
             "removed_parts": list(suggestion.pair.change.removed),
-            "after": _state(suggestion.pair.report),
+            "after": state_dict(suggestion.pair.report),
         },
     }

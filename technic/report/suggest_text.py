@@ -6,8 +6,9 @@ from collections import Counter
 from collections.abc import Sequence
 
 from technic.assembly.model import Assembly
+from technic.design.bar_answer import BarSuggestion
 from technic.design.candidates import Attachment, describe_fit
-from technic.design.confidence import FACTOR
+from technic.design.confidence import FACTOR, RANK_SURE
 from technic.design.filters import needs
 from technic.design.suggest import Suggestion, Suggestions
 from technic.parts.catalogue import catalogue
@@ -67,7 +68,7 @@ def hole_words(assembly: Assembly, attachment: Attachment) -> str:
     )
 
 
-def cure_words(before: RigidityReport, suggestion: Suggestion) -> str:
+def cure_words(before: RigidityReport, suggestion: Suggestion | BarSuggestion) -> str:
     """Return what gets better."""
     joined_now = len(before.components) - len(suggestion.report.components)
     if joined_now > 0:
@@ -89,7 +90,7 @@ def cure_words(before: RigidityReport, suggestion: Suggestion) -> str:
     )
 
 
-def _state(report: RigidityReport) -> str:
+def state_words(report: RigidityReport) -> str:
     said = report.verdict.value
     if report.mobility.structural:
         said += f", {count(report.mobility.structural, 'motion')}"
@@ -106,7 +107,7 @@ def _suggestion(before: RigidityReport, suggestion: Suggestion, style: Style) ->
     lines = style.wrap(f"{suggestion.rank}. {parts_words(suggestion)}", "", "   ")
     lines[0] = style("bold", lines[0])
     lines += style.wrap(
-        f"Then: {_state(after)}{factor}. It {cure_words(before, suggestion)}.", "   "
+        f"Then: {state_words(after)}{factor}. It {cure_words(before, suggestion)}.", "   "
     )
     for attachment in candidate.attachments:
         lines += style.wrap(hole_words(assembly, attachment), "   - ", "     ")
@@ -121,7 +122,7 @@ def _suggestion(before: RigidityReport, suggestion: Suggestion, style: Style) ->
         said = f"{count(suggestion.twins, 'other place')} for the same part would do about as well"
         if suggestion.pair is not None:
             twin = joined([_coordinates(a.point) for a in suggestion.pair.candidate.attachments])
-            said += f"; with a second one, holes at {twin}: {_state(suggestion.pair.report)}"
+            said += f"; with a second one, holes at {twin}: {state_words(suggestion.pair.report)}"
         lines += style.wrap(f"{said}.", "   ")
     if sure := sure_words(suggestion):
         lines += style.wrap(sure, "   ")
@@ -132,7 +133,7 @@ def _head(answer: Suggestions, style: Style) -> list[str]:
     before = answer.before
     return [
         style("bold", f"{before.assembly.name}: {count(len(before.assembly.parts), 'part')}"),
-        f"Now: {_state(before)}",
+        f"Now: {state_words(before)}",
     ]
 
 
@@ -182,6 +183,8 @@ def sure_words(suggestion: Suggestion) -> str:
         said += f", {low} to {high} times as rigid as now"
     if sure.beats_next is not None:
         said += f"; better than the next one with a probability of {100 * sure.beats_next:.0f} %"
+        if sure.beats_next < RANK_SURE:
+            said += ", so their order is not sure"
     return f"How sure: {said}."
 
 
@@ -231,7 +234,10 @@ def sequence_text(answers: Sequence[Suggestions], style: Style | None = None) ->
         lines += ["", *style.wrap(nothing_words(answers[-1]))]
     if taken:
         last = taken[-1].suggestions[0].report
-        lines += ["", *style.wrap(f"In the end: {_state(last)}.{_gain(answers[0].before, last)}")]
+        lines += [
+            "",
+            *style.wrap(f"In the end: {state_words(last)}.{_gain(answers[0].before, last)}"),
+        ]
         said = joined([f"{n} x {part}" for part, n in sorted(total.items())])
         lines += [*style.wrap(f"Parts: {said}."), *_unseen(answers[0], style)]
         lines += style.wrap(basis_words([a.suggestions[0] for a in taken]))

@@ -1,7 +1,8 @@
 """Does the answer hold under the uncertainty of the measured stiffnesses?
 
 The verdict and the motions follow from what joints hold, not from how stiff they are, so they always do. What
-can change is an order: which spot is the weakest, which of two reinforced models is the more rigid.
+can change is an order: which spot is the weakest. (Which of two reinforced models is the more rigid:
+`technic.design.confidence`.)
 
 Stiffnesses are drawn from their joint distribution (normal in the logarithms) and the analysis is repeated
 for each draw on a few shapes instead of all unknowns (Rayleigh and Ritz): the lowest modes, and how the
@@ -21,12 +22,12 @@ from scipy import linalg, sparse
 
 from technic.assembly.stiffness import StiffnessTable
 from technic.geometry import Array
-from technic.rigidity.result import Mode, RigidityReport, SpotRange, Stability, WeakSpot
+from technic.rigidity.result import Mode, SpotRange, Stability, WeakSpot
 from technic.system.assemble import System
 from technic.system.inverse import shifted_inverse, single_thread
 from technic.system.parameters import Parameter, parameter_rows
 
-__all__ = ["DRAWS", "Pencil", "draw", "rank_intervals", "stability"]
+__all__ = ["DRAWS", "Pencil", "draw", "stability"]
 
 DRAWS: Final = 400
 """Draws: the ends of a 95 % range are then known to one in a hundred of the draws."""
@@ -226,46 +227,6 @@ def _shares(
     np.add.at(joints, system.rows.link[elastic], energy)
     found = np.array([(joints if s.kind == "joint" else parts)[s.index] for s in spots])
     return np.asarray(found / found.sum(axis=0))
-
-
-def rank_intervals(
-    reports: Sequence[RigidityReport], groups: Sequence[int], table: StiffnessTable | None
-) -> list[tuple[int, int] | None]:
-    """Return the ranks, from 1 for the most rigid, between which each model lies with 95 % confidence.
-
-    Parameters
-    ----------
-    reports : sequence of RigidityReport
-        Analysed with `table`, best first.
-    groups : sequence of int
-        Models of different groups are never exchanged: their order has another reason than rigidity.
-    table : StiffnessTable or None
-
-    Returns
-    -------
-    list of (int, int) or None
-        None when nothing was measured, and for a model without a rigidity. To first order:
-        ``log lambda`` changes by its slopes.
-    """
-    places: list[tuple[int, int] | None] = [None] * len(reports)
-    if table is None or not table.measured:
-        return places
-    changes = draw(table)
-    for group in dict.fromkeys(groups):
-        first = list(groups).index(group)
-        members, values, slopes = [], [], []
-        for k, report in enumerate(reports):
-            if groups[k] == group and report.rigidity is not None:
-                members.append(k)
-                values.append(np.log(report.rigidity.value))
-                slopes.append(report.rigidity.log_slopes or np.zeros(changes.shape[1]))
-        if not members:
-            continue
-        drawn = np.array(values)[:, None] + np.array(slopes) @ changes.T
-        for k, ranks in zip(members, _ranks(-drawn), strict=True):
-            low, high = _range(ranks)
-            places[k] = (first + low, first + high)
-    return places
 
 
 def _ranks(values: Array) -> NDArray[np.int64]:
