@@ -24,6 +24,7 @@ __all__ = [
     "factor_of",
     "freedom",
     "merit",
+    "reached",
     "relieved",
     "stopped",
 ]
@@ -138,6 +139,13 @@ def merit(report: RigidityReport) -> tuple[float, float]:
         -float(freedom(report)),
         report.rigidity.value if report.rigidity is not None else np.inf,
     )
+
+
+def reached(report: RigidityReport, target: float) -> bool:
+    """Return whether a model is rigid, of one piece, and this stiff (N/m)."""
+    if freedom(report) or report.rigidity is None:
+        return False
+    return report.rigidity.value >= target
 
 
 def factor_of(before: RigidityReport, after: RigidityReport) -> float | None:

@@ -5,23 +5,25 @@ from __future__ import annotations
 from dataclasses import replace
 
 from technic.assembly.model import Assembly
+from technic.design.answer import reached
 from technic.design.apply import HIGHLIGHT
+from technic.design.bar_answer import BarSuggestions
+from technic.design.bar_search import suggest_bars
+from technic.design.bars import Rules
 from technic.design.filters import Filters, carried_over
 from technic.design.suggest import (
     SHORTLIST,
     Progress,
     Rank,
     Suggestions,
-    freedom,
     merit,
     suggest,
     table_of,
 )
 from technic.rigidity.analyze import analyze
-from technic.rigidity.result import RigidityReport
 from technic.system.part_models import PartModel
 
-__all__ = ["reinforce"]
+__all__ = ["reinforce", "reinforce_bars"]
 
 
 def reinforce(
@@ -64,7 +66,7 @@ def reinforce(
     current = assembly
     done: list[Suggestions] = []
     for _ in range(steps):
-        if target is not None and _reached(before, target):
+        if target is not None and reached(before, target):
             break
         answer = suggest(
             current,
@@ -89,7 +91,45 @@ def reinforce(
     return done
 
 
-def _reached(report: RigidityReport, target: float) -> bool:
-    if freedom(report) or report.rigidity is None:
-        return False
-    return report.rigidity.value >= target
+def reinforce_bars(
+    assembly: Assembly,
+    *,
+    steps: int,
+    target: float | None = None,
+    rules: Rules | None = None,
+    rank: Rank = "ritz",
+    progress: Progress | None = None,
+) -> list[BarSuggestions]:
+    """Add the best bar again and again, the model analysed anew each time.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    steps : int
+        Most bars to add.
+    target : float, optional
+        Stop when the model is rigid, of one piece, and this stiff (N/m).
+    rules, rank, progress
+        As for `suggest_bars`.
+
+    Returns
+    -------
+    list of BarSuggestions
+        One for each bar, its first suggestion the one taken; the last has none when nothing more
+        helps.
+    """
+    before = analyze(assembly, modes=1)
+    done: list[BarSuggestions] = []
+    for _ in range(steps):
+        if target is not None and reached(before, target):
+            break
+        answer = suggest_bars(
+            assembly, count=1, rules=rules, rank=rank, before=before, progress=progress
+        )
+        if not answer.suggestions:
+            done.append(answer)
+            break
+        taken = replace(answer.suggestions[0], rank=len(done) + 1)
+        done.append(replace(answer, suggestions=(taken,)))
+        assembly, before = taken.report.assembly, taken.report
+    return done

@@ -61,6 +61,7 @@ def suggestions_dict(answers: Sequence[Suggestions], *, sequence: bool) -> dict[
 
 
 def state_dict(report: RigidityReport) -> dict[str, Any]:
+    """Return what a state of the model is told by."""
     full = report.to_dict()
     return {key: full[key] for key in ("verdict", "mobility", "rigidity")}
 
@@ -78,6 +79,7 @@ def _new_part(part: NewPart) -> dict[str, Any]:
 
 
 def confidence_dict(sure: Confidence | None) -> dict[str, Any] | None:
+    """Return how sure a suggestion is as plain values."""
     if sure is None:
         return None
     return {

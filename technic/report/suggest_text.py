@@ -171,7 +171,7 @@ def _unseen(answer: Suggestions, style: Style) -> list[str]:
     return style.wrap(said) if said else []
 
 
-def sure_words(suggestion: Suggestion) -> str:
+def sure_words(suggestion: Suggestion | BarSuggestion) -> str:
     """Return how sure the numbers of a suggestion are, in words."""
     sure = suggestion.confidence
     if sure is None:
@@ -188,7 +188,7 @@ def sure_words(suggestion: Suggestion) -> str:
     return f"How sure: {said}."
 
 
-def basis_words(suggestions: Sequence[Suggestion]) -> str:
+def basis_words(suggestions: Sequence[Suggestion | BarSuggestion]) -> str:
     """Say what the intervals rest on."""
     bases = {s.confidence.basis for s in suggestions if s.confidence is not None}
     if "calibration" in bases:
