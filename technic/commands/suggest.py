@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -22,6 +22,7 @@ from technic.commands.options import (
 )
 from technic.commands.progress import progress_bar
 from technic.commands.reading import model_options, reading
+from technic.commands.suggest_bars import BarWishes, suggest_for_linkage
 from technic.errors import MissingDependency, UsageError
 
 if TYPE_CHECKING:
@@ -79,6 +80,13 @@ def _filters(assembly: Assembly, wishes: _Wishes) -> Filters:
         max_parts=wishes.max_parts,
         keep_out=frozenset(find_part(assembly, text) for text in wishes.keep_out),
     )
+
+
+def _refuse(given: Mapping[str, object], why: str) -> None:
+    """Refuse options that say nothing about this kind of model."""
+    for name, value in given.items():
+        if value:
+            raise UsageError(f"{name} is {why}")
 
 
 def _lengths(text: str | None) -> tuple[int, ...] | None:
@@ -152,7 +160,10 @@ def _page(answers: Sequence[Suggestions], path: Path, *, sequence: bool) -> None
 
 @model_options
 def suggest(
-    model: Annotated[Path, typer.Argument(metavar="MODEL", help="LDraw file (.ldr, .mpd).")],
+    model: Annotated[
+        Path,
+        typer.Argument(metavar="MODEL", help="LDraw file (.ldr, .mpd) or assembly file (.json)."),
+    ],
     json: JsonOption = None,
     top: Annotated[
         int, typer.Option("--top", min=1, max=100, metavar="N", help="How many alternatives.")
@@ -175,7 +186,11 @@ def suggest(
     ] = None,
     box: Annotated[
         tuple[float, float, float, float, float, float] | None,
-        typer.Option("--box", metavar="X Y Z X Y Z", help="Only inside this box (LDU)."),
+        typer.Option(
+            "--box",
+            metavar="X Y Z X Y Z",
+            help="Only inside this box (LDU; mm for assembly files).",
+        ),
     ] = None,
     lengths: Annotated[
         str | None,
@@ -188,6 +203,14 @@ def suggest(
             "--snug", min=0.0, max=0.3, metavar="MM", help="Also where holes miss by this much."
         ),
     ] = 0.0,
+    shortest: Annotated[
+        float,
+        typer.Option("--shortest", min=0.0, metavar="MM", help="Assembly files: shortest bar."),
+    ] = 0.0,
+    longest: Annotated[
+        float | None,
+        typer.Option("--longest", min=0.0, metavar="MM", help="Assembly files: longest bar."),
+    ] = None,
     inventory: Annotated[
         Path | None,
         typer.Option("--inventory", metavar="CSV", help="Only parts of this list (part,count)."),
@@ -235,7 +258,7 @@ def suggest(
     how: ModelOptions = AS_FOUND,
     quiet: QuietOption = False,
 ) -> None:
-    """Say which real beam makes a model more rigid, and write the model with it."""
+    """Say which real beam (for a linkage: which new bar) makes a model more rigid, and write it."""
     from technic.design.apply import write_reinforced
     from technic.design.filters import needs
     from technic.design.reinforce import reinforce
@@ -257,7 +280,39 @@ def suggest(
         if path is not None:
             check_writable(path)
     if model.suffix.lower() == ".json":
-        raise UsageError("suggestions are made of LEGO parts: give an LDraw model (.ldr, .mpd)")
+        reading(model, how)  # refuses what says nothing about an assembly file
+        lego = {
+            "--lengths": lengths,
+            "--straight": straight,
+            "--snug": snug,
+            "--inventory": inventory,
+            "--max-parts": max_parts,
+            "--parts-list": parts_list,
+            "--pair": pair,
+            "--report": report,
+        }
+        _refuse(lego, "for LDraw models; an assembly file gets new bars")
+        suggest_for_linkage(
+            model,
+            BarWishes(
+                between=between,
+                box=box,
+                shortest=shortest,
+                longest=longest,
+                keep_out=tuple(keep_out or ()),
+                top=top,
+                count=count,
+                target=target,
+                rank=rank,
+                apply=apply,
+                out=out,
+                picture=picture,
+                json=json,
+                quiet=quiet,
+            ),
+        )
+        return
+    _refuse({"--shortest": shortest, "--longest": longest}, "for assembly files; see --lengths")
     options = reading(model, how)
     assembly = load(model, **options)
     wishes = _Wishes(

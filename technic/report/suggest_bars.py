@@ -31,7 +31,7 @@ def pattern_words(pattern: Pattern) -> str:
 
 
 def _place(end: End, assembly: Assembly) -> str:
-    numbers = [number(round(v / MM, 3) + 0.0, 6) for v in end.point[: assembly.dimension]]
+    numbers = [f"{round(v / MM, 2) + 0.0:g}" for v in end.point[: assembly.dimension]]
     names = joined([assembly.parts[p].id for p in end.parts])
     return f"({', '.join(numbers)}) mm on {names}"
 
