@@ -16,9 +16,10 @@ import numpy as np
 from technic.assembly.joint_types import HELD, JointType
 from technic.assembly.model import Finding, FindingKind, Joint, Part
 from technic.assembly.typed_joints import joint_axes
-from technic.geometry import readonly
+from technic.geometry import axes_from, readonly
 from technic.parts.definition import MassProperties, PartDefinition, Port, RigidBody
-from technic.parts.inner import InnerBody, InnerPart, inner_parts
+from technic.parts.inner import ASSUMED, TRANSLATION, InnerBody, InnerPart, Screw, inner_parts
+from technic.parts.teeth import teeth_table
 
 __all__ = ["Divided", "InnerMotion", "divide"]
 
@@ -29,6 +30,7 @@ _NAMES: Final = {
     "actuator": ("actuator", "its rod"),
     "spring": ("shock absorber", "its rod"),
     "universal": ("universal joint", "its second fork"),
+    "clutch": ("clutch gear", "its centre"),
 }
 
 
@@ -69,15 +71,18 @@ def divide(parts: Sequence[Part], inner: InnerMotion = "held") -> Divided:
                 made[place], moving = piece
                 made.append(moving)
                 joints.append(_joint(made, place, len(made) - 1, body, entry))
+                if body.screw is not None:
+                    joints += _thread(made, place, body, body.screw, entry)
         findings.append(_finding(made, place, entry, divided=len(made) > place + 1))
     return Divided(tuple(made), tuple(joints), tuple(findings))
 
 
 def _piece(part: Part, body: InnerBody) -> tuple[Part, Part] | None:
-    """Return the rest and the moving piece; None when no connector is on one of them."""
+    """Return the rest and the moving piece; None when nothing holds one of them: connectors or teeth."""
     own = tuple(port for port in part.ports if body.owns(port))
     rest = tuple(port for port in part.ports if not body.owns(port))
-    if not own or not rest:
+    toothed = part.definition is not None and teeth_table().get(part.definition.id)
+    if not own or not (rest or toothed):
         return None
     whole = part.mass_properties
     share = body.share
@@ -145,6 +150,39 @@ def _joint(
         connection=f"inside/{entry.kind}",
         provenance=provenance,
     )
+
+
+def _thread(
+    parts: Sequence[Part], first: int, body: InnerBody, screw: Screw, entry: InnerPart
+) -> list[Joint]:
+    """Return the thread between a piece and another one of the same part, if that is there.
+
+    Where the threads touch, they cannot move through each other: one row, like that of two gears. On
+    the axis a turn makes ``lead`` of way, so the thread's flank is inclined by ``lead / (2 pi r)``.
+    """
+    name = f"{parts[first].id}#{screw.partner}"
+    partner = next((k for k in range(first + 1, len(parts)) if parts[k].id == name), None)
+    if partner is None:
+        return []
+    pose = parts[first].pose
+    axis = pose.directions(body.axis)
+    out = axes_from(axis)[1]
+    slope = screw.lead / (2.0 * np.pi * screw.radius)
+    flank = axis - slope * np.cross(axis, out)
+    held = readonly(HELD[JointType.MESH], dtype=np.bool_)
+    return [
+        Joint(
+            id=f"{parts[first].id}~#{screw.partner}~#{body.name}",
+            type=JointType.MESH,
+            parts=(partner, len(parts) - 1),
+            point=pose.points(body.point) + screw.radius * out,
+            axes=axes_from(flank),
+            held=held,
+            stiffness=np.where(held, TRANSLATION, 0.0),
+            connection=f"inside/{entry.kind}",
+            provenance=ASSUMED,
+        )
+    ]
 
 
 def _finding(parts: Sequence[Part], place: int, entry: InnerPart, *, divided: bool) -> Finding:

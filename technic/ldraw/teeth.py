@@ -56,7 +56,8 @@ def gears_of(part: Part, index: int) -> tuple[Gear, ...]:
         return ()
     own = teeth_table().get(part.definition.id)
     if own is None:
-        own = _by_title(part)
+        # a piece of a divided part (its id has a #) has the part's title, but not its teeth
+        own = () if "#" in part.definition.id else _by_title(part)
     return tuple(Gear(index, _placed(teeth, part)) for teeth in own)
 
 

@@ -16,7 +16,15 @@ from technic.geometry import Array, readonly
 from technic.parts.definition import Port
 from technic.units import LDU
 
-__all__ = ["InnerBody", "InnerPart", "inner_parts", "parse_inner"]
+__all__ = [
+    "ASSUMED",
+    "TRANSLATION",
+    "InnerBody",
+    "InnerPart",
+    "Screw",
+    "inner_parts",
+    "parse_inner",
+]
 
 TRANSLATION: Final = 1e4
 """Stiffness (N/m) of held translations that the file does not give: the paper's default."""
@@ -26,9 +34,28 @@ ROTATION: Final = 0.16
 
 ASSUMED: Final = "assumed"
 
-_KINDS: Final = ("motor", "actuator", "spring", "universal")
+_KINDS: Final = ("motor", "actuator", "spring", "universal", "clutch")
 _JOINTS: Final = ("hinge", "slider", "cylindrical", "ball", "universal")
 _MOTIONS: Final = ("axial", "shear", "spin", "tilt")
+
+
+@dataclass(frozen=True, slots=True)
+class Screw:
+    """A thread between two pieces of a part.
+
+    Parameters
+    ----------
+    partner : str
+        Name of the other piece.
+    lead : float
+        Way along the axis a turn (m).
+    radius : float
+        Of the thread (m).
+    """
+
+    partner: str
+    lead: float
+    radius: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,6 +82,7 @@ class InnerBody:
         In the order of `assembly.joint_types`.
     given : tuple of str
         Motions whose stiffness the file states.
+    screw : Screw or None
     """
 
     name: str
@@ -69,6 +97,7 @@ class InnerBody:
     share: float
     stiffness: Array
     given: tuple[str, ...]
+    screw: Screw | None = None
 
     def owns(self, port: Port) -> bool:
         """Tell whether a connector belongs to the piece."""
@@ -171,4 +200,12 @@ def _body(row: Mapping[str, Any]) -> InnerBody:
         share=share,
         stiffness=readonly([value[m] for m in ("axial", "shear", "shear", "spin", "tilt", "tilt")]),
         given=given,
+        screw=_screw(row["screw"]) if "screw" in row else None,
     )
+
+
+def _screw(row: Mapping[str, Any]) -> Screw:
+    lead, radius = float(row["lead"]), float(row["radius"])
+    if not (lead > 0.0 and radius > 0.0):
+        raise ValueError("lead or radius")
+    return Screw(str(row["with"]), lead * LDU, radius * LDU)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from technic.assembly.joint_types import JointType
 from technic.assembly.model import FindingKind, Part
 from technic.errors import SchemaError, UsageError
 from technic.geometry import Pose
+from technic.ldraw.gears import find_meshes
 from technic.ldraw.inner import divide
 from technic.ldraw.reader import load_ldraw
 from technic.parts.catalogue import catalogue
@@ -39,19 +42,21 @@ def placed(number: str, pose: Pose | None = None) -> Part:
 def test_every_part_of_the_catalogue_divides_and_loses_nothing(number):
     part = placed(number)
     whole = divide([part], "free")
-    assert len(whole.parts) == 2, "the file's stretch catches no connector, or all of them"
-    rest, piece = whole.parts
+    bodies = inner_parts()[number].bodies
+    assert len(whole.parts) == 1 + len(bodies), "a stretch catches no connector, or all of them"
+    rest, *pieces = whole.parts
     assert rest.id == part.id
-    assert piece.id.startswith(f"{part.id}#")
-    names = [port.name for port in (*rest.ports, *piece.ports)]
+    assert [piece.id for piece in pieces] == [f"{part.id}#{body.name}" for body in bodies]
+    names = [port.name for piece in whole.parts for port in piece.ports]
     assert sorted(names) == sorted(port.name for port in part.ports)
     masses = [p.mass_properties for p in whole.parts]
     assert sum(m.mass for m in masses) == pytest.approx(part.mass_properties.mass)
     balance = sum(m.mass * m.centroid for m in masses) / part.mass_properties.mass
     assert balance == pytest.approx(part.mass_properties.centroid)
-    (joint,) = whole.joints
-    assert joint.parts == (0, 1)
-    assert (joint.stiffness[joint.held] > 0.0).all()
+    hung = [joint for joint in whole.joints if joint.parts[0] == 0]
+    assert [joint.parts for joint in hung] == [(0, k + 1) for k in range(len(bodies))]
+    for joint in whole.joints:
+        assert (joint.stiffness[joint.held] > 0.0).all()
 
 
 def test_a_motor_holds_unless_it_is_free():
@@ -110,11 +115,80 @@ ARM = """0 Arm
 def test_an_actuator_holds_or_slides(tmp_path):
     path = tmp_path / "arm.ldr"
     path.write_text(ARM.format(x=0))
-    totals = [
-        analyze(load_ldraw(path, inner=inner), parts="rigid").mobility.total
-        for inner in ("held", "free")
-    ]
-    assert totals[1] == totals[0] + 1
+    held, free = (load_ldraw(path, inner=inner) for inner in ("held", "free"))
+    totals = [analyze(assembly, parts="rigid").mobility.total for assembly in (held, free)]
+    # The rod turns, and it slides as its input turns.
+    assert totals[1] == totals[0] + 2
+    assert sum(joint.type is JointType.MESH for joint in free.joints) == 1
+    # An input that cannot turn holds the rod: welded to the housing, it only turns about itself.
+    file = tmp_path / "o.toml"
+    names = [part.id for part in free.parts]
+    file.write_text(
+        f'schema = "technic-overrides/1"\n[[weld]]\nparts = ["{names[0]}", "{names[1]}"]\n'
+    )
+    braked = load_ldraw(path, inner="free", overrides=file)
+    assert analyze(braked, parts="rigid").mobility.total == totals[0] + 1
+
+
+@given(
+    axis=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1),
+    angle=st.floats(-180.0, 180.0),
+    drift=st.tuples(*[st.floats(-1.0, 1.0)] * 6),
+    turning=st.floats(-3.0, 3.0),
+    rolling=st.floats(-3.0, 3.0),
+)
+def test_a_thread_lets_the_rod_move_by_its_lead_and_no_other_way(
+    axis, angle, drift, turning, rolling
+):
+    pose = Pose(rotation(axis, angle), np.array([0.1, 0.2, 0.3]))
+    whole = divide([placed("61927", pose)], "free")
+    (thread,) = [joint for joint in whole.joints if joint.type is JointType.MESH]
+    assert [whole.parts[k].id.split("#")[1] for k in thread.parts] == ["input", "rod"]
+    lead = 3.85 * LDU
+    along = pose.directions(np.array([0.0, 0.0, 1.0]))
+    arm = thread.point - pose.translation
+    flank = thread.axes[0]
+
+    def speed(omega, velocity):
+        return float((velocity + np.cross(omega, arm)) @ flank)
+
+    swirl, push = np.array(drift[:3]), np.array(drift[3:])
+    # the input turns, the rod turns by some other angle, and moves by the difference of the turns
+    way = -lead / (2.0 * np.pi) * (turning - rolling)
+    slip = speed(swirl + turning * along, push) - speed(swirl + rolling * along, push + way * along)
+    assert abs(slip) < 1e-12
+    assert abs(speed(0.0 * along, along)) == pytest.approx(1.0, abs=0.01)  # pushed: it holds
+
+
+def test_a_clutch_gear_slips_when_it_may():
+    gear, other = placed("76244"), placed("10928", Pose(np.eye(3), np.array([40.0, 0, 0]) * LDU))
+    held, free = divide([gear, other]), divide([gear, other], "free")
+    assert (len(held.parts), len(free.parts)) == (2, 3)
+    assert "holds its position" in held.findings[0].message
+    assert [len(part.ports) for part in free.parts[:2]] == [0, 1]
+    assert [mesh.parts for mesh in find_meshes(held.parts)] == [(0, 1)]
+    assert [mesh.parts for mesh in find_meshes(free.parts)] == [(0, 2)]  # the ring has the teeth
+
+
+DRIVE = """0 A motor's output with a wheel
+1 71 0 0 0 1 0 0 0 1 0 0 0 1 99499.dat
+"""
+
+
+def test_a_motors_output_turns_what_is_on_it(tmp_path):
+    """An axle in the output, a gear on it: fixed to the motor, or one motion that spins."""
+    definition = catalogue().get("99499")
+    bore = next(p for p in definition.ports if p.kind.value == "axle_hole")
+    x, y, z = bore.position / LDU
+    assert abs(bore.axis @ [0, 0, 1]) == pytest.approx(1.0)
+    text = DRIVE + f"1 0 {x:.3f} {y:.3f} {z - 20:.3f} 0 0 -1 0 1 0 1 0 0 3705.dat\n"
+    path = tmp_path / "drive.ldr"
+    path.write_text(text)
+    held, free = (
+        analyze(load_ldraw(path, inner=inner), parts="rigid") for inner in ("held", "free")
+    )
+    assert held.mobility.total == 0
+    assert free.mobility.total == 1
 
 
 def test_inner_is_held_or_free(model):
@@ -153,6 +227,7 @@ GOOD = {
         {"body": [GOOD["body"][0] | {"axial": -1.0}]},
         {"body": [GOOD["body"][0] | {"joint": "universal"}]},
         {"body": [GOOD["body"][0] | {"joint": "weld"}]},
+        {"body": [GOOD["body"][0] | {"screw": {"with": "input", "lead": 0, "radius": 1}}]},
     ],
 )
 def test_faults_of_the_file_are_said(change):
