@@ -49,6 +49,12 @@ ITERATIONS = 40
 DAMPING = 1e-11
 """Relative damping of the normal equations: just above rounding, so that free motions stay put."""
 
+CAUTION = 30.0
+"""More damping while joints gape, this times the square of the widest gap. In overconstrained linkages
+(Bennett's, Bricard's) the joints seem to hold a motion as long as they gape, and undamped steps run away
+along it. Damping by the square of the residual keeps convergence quadratic wherever there is a path
+(Yamashita and Fukushima, Computing Supplement 15, 2001, 239-249)."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement:
@@ -242,7 +248,7 @@ def _close(kin: Kinematics, arrays: Links, target: Array, moved: Placement) -> P
         before = widest
         j = jacobian(arrays, here, kin.length, dofs)
         normal = sparse.csc_array(j.T @ j)
-        damping = DAMPING * float(normal.diagonal().max())
+        damping = max(DAMPING * float(normal.diagonal().max()), CAUTION * widest**2)
         matrix = sparse.csc_array(normal + damping * sparse.eye_array(normal.shape[0]))
         try:
             factor = sparse_linalg.splu(
