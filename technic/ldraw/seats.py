@@ -1,13 +1,15 @@
-"""Parts that belong to each other without a connector: tyres on rims, the two halves of a turntable.
+"""Parts that belong to each other without a connector: tyres on rims, the two halves of a turntable,
+planet gears in a differential, driving rings on their joiners and in the gears that they drive.
 
-Neither has a pin, an axle or a stud. They are recognised by what they are (family or LDraw title) and
-by lying on one line at one place.
+None of them has a pin, an axle or a stud for it. They are recognised by what they are (family or LDraw
+title) and by lying on one line at one place.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -15,16 +17,31 @@ from technic.assembly.model import Part
 from technic.geometry import Array
 from technic.ldraw.matching import Limits
 from technic.parts.definition import PortKind
-from technic.units import PITCH
+from technic.units import LDU, PITCH
 
-__all__ = ["PLANET", "TURNTABLE", "TYRE", "Seat", "seats"]
+__all__ = ["DOGS", "PLANET", "RING", "TURNTABLE", "TYRE", "Seat", "seats"]
 
 TYRE = "tyre/rim"
 TURNTABLE = "turntable/turntable"
 PLANET = "planet/differential"
+RING = "driving ring/joiner"
+DOGS = "driving ring/clutch"
 
 PLANET_REACH = PITCH
 """Furthest that a planet gear is from the middle of its casing along its own shaft (m)."""
+
+
+RINGS: Final = {"6539": 20.0 * LDU, "18947": 28.0 * LDU, "2473a": 18.0 * LDU}
+"""Driving rings and half their length (LDraw 2026-02: their dogs reach that far along z)."""
+
+RIDGES: Final = 15.0 * LDU
+"""Furthest that a ring is from the middle of the joiner it clicks on: a step of 10 LDU either way."""
+
+GEAR_HALF: Final = 10.0 * LDU
+"""Half the length of the gears with a clutch."""
+
+ENGAGED: Final = 4.0 * LDU
+"""How deep a ring's dogs are in a gear at least, when they drive it; 8 LDU in LDraw, none in neutral."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,6 +100,7 @@ def seats(parts: Sequence[Part], limits: Limits) -> list[Seat]:
             taken.update(best.parts)
             found.append(best)
     found += _planets(parts, limits)
+    found += _driving(parts, limits)
     return sorted(found, key=lambda seat: seat.parts)
 
 
@@ -121,13 +139,48 @@ def _planets(parts: Sequence[Part], limits: Limits) -> list[Seat]:
     return found
 
 
+def _driving(parts: Sequence[Part], limits: Limits) -> list[Seat]:
+    """Return the driving rings on their joiners, and the gears that they are shifted into.
+
+    A gear with a clutch turns freely on its shaft until the dogs of a ring enter it.
+    """
+    found: list[Seat] = []
+    for k, ring in enumerate(parts):
+        half = RINGS.get(ring.definition.id if ring.definition is not None else ring.number)
+        if half is None:
+            continue
+        line = ring.pose.translation, ring.pose.directions(np.array([0.0, 0.0, 1.0]))
+        titles = [_title(part) for part in parts]
+        joiners = {n: _bore(parts[n]) for n, t in enumerate(titles) if t.startswith("axle joiner")}
+        gears = {
+            n: _bore(parts[n])
+            for n, t in enumerate(titles)
+            if t.startswith("gear ") and " clutch" in t and _turns(parts[n])
+        }
+        seat = _nearest(k, line, joiners, RIDGES, limits, RING)
+        reach = half + GEAR_HALF - ENGAGED
+        driven = _nearest(k, line, gears, reach, limits, DOGS)
+        found += [one for one in (seat, driven) if one is not None]
+    return found
+
+
+def _turns(part: Part) -> bool:
+    """Tell whether a gear's bores are round."""
+    return all(port.kind is not PortKind.AXLE_HOLE for port in part.ports)
+
+
 def _is(part: Part, what: str) -> bool:
     """Return whether a part is of a kind, by its family or by its title in the LDraw manner."""
     definition = part.definition
     if definition is None:
         return False
-    title = definition.title.lower().lstrip("~=_| ").removeprefix("technic ")
-    return definition.family.split("-")[0] == what or title.split(" ")[0] == what
+    return definition.family.split("-")[0] == what or _title(part).split(" ")[0] == what
+
+
+def _title(part: Part) -> str:
+    """Return a part's title without marks of the library, in small letters."""
+    title = "" if part.definition is None else part.definition.title
+    return title.lower().lstrip("~=_| ").removeprefix("technic ")
 
 
 _Line = tuple[Array, Array]

@@ -110,3 +110,50 @@ def test_planet_gears_turn_on_the_stubs_of_their_casing(side):
 )
 def test_gears_elsewhere_are_no_planets(at, along):
     assert joints_of([place(casing(), (0, 0, 0)), place(planet(), at, turn("z", along))]) == ()
+
+
+# --- gearboxes ------------------------------------------------------------------------------------
+def ring():
+    """Return a driving ring about z, which has no connector."""
+    return define("18947", "Technic Transmission Driving Ring 3L", [])
+
+
+def joiner():
+    """Return the ridged joiner that a driving ring sits on, about z."""
+    ends = [port(f"end{k}", "axle_hole", [0, 0, z], Z, 28) for k, z in enumerate((-16, 16))]
+    return define("18948", "Technic Axle Joiner 3L with Ridges for Driving Ring", ends)
+
+
+def clutch():
+    """Return a gear with a clutch: it turns on its shaft."""
+    bore = port("hole", "pin_hole", [0, 0, 0], Z, 20)
+    return define("18946", "Technic Gear 16 Tooth with Clutch on Both Sides", [bore])
+
+
+@pytest.mark.parametrize(("shift", "driven"), [(-10, (1, 2)), (0, None), (10, (1, 3))])
+def test_a_driving_ring_is_on_its_joiner_and_in_the_gear_that_it_drives(shift, driven):
+    parts = [
+        place(joiner(), (0, 0, 0)),
+        place(ring(), (0, 0, shift)),
+        place(clutch(), (0, 0, -40)),
+        place(clutch(), (0, 0, 40)),
+    ]
+    joints = {joint.connection: joint for joint in joints_of(parts)}
+    assert joints["driving ring/joiner"].type is JointType.FIXED
+    assert joints["driving ring/joiner"].parts == (0, 1)
+    dogs = joints.get("driving ring/clutch")
+    assert (None if dogs is None else dogs.parts) == driven
+    if dogs is not None:
+        assert dogs.type is JointType.SLIDER
+        assert abs(dogs.axes[0] @ [0, 0, 1]) == pytest.approx(1.0)
+
+
+def test_a_ring_elsewhere_drives_nothing():
+    beside = [place(joiner(), (0, 0, 0)), place(ring(), (20, 0, 0)), place(clutch(), (0, 0, 30))]
+    assert joints_of(beside) == ()
+    across = [place(joiner(), (0, 0, 0)), place(ring(), (0, 0, 0), turn("z", "x"))]
+    assert joints_of(across) == ()
+    slipping = define(
+        "76244", "Gear 24 Tooth Clutch", [port("hole", "axle_hole", [0, 0, 0], Z, 20)]
+    )
+    assert joints_of([place(ring(), (0, 0, 0)), place(slipping, (0, 0, 20))]) == ()
