@@ -12,11 +12,12 @@ from technic.assembly.stiffness import MOTIONS, default_table, read_table
 from technic.errors import InputError, SchemaError, UsageError
 from technic.ldraw.gears import CONNECTION as GEARS
 from technic.ldraw.matching import MATES
-from technic.ldraw.seats import PLANET, TURNTABLE, TYRE
+from technic.ldraw.seats import DOGS, PLANET, RING, TURNTABLE, TYRE
 
 
 def test_every_connection_has_an_entry():
-    assert {*MATES.values(), TYRE, TURNTABLE, PLANET, GEARS} == set(default_table().connections)
+    known = {*MATES.values(), TYRE, TURNTABLE, PLANET, RING, DOGS, GEARS}
+    assert known == set(default_table().connections)
 
 
 def test_pin_has_the_papers_values():
