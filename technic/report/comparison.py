@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from technic.report.drawing import (
     drawing_of,
     furthest_way,
 )
+from technic.report.load_arrows import LOAD_COLOR, load_arrows
 from technic.report.palette import NEUTRAL
 from technic.report.picture import model_layers, outline
 from technic.report.scene import LegendItem, Lines, Panel, Scene, Surface
@@ -38,16 +40,18 @@ def common_scale(reports: Sequence[RigidityReport], drawings: Sequence[Drawing])
 
 
 def _layers(
-    report: RigidityReport, drawing: Drawing, scale: float
+    report: RigidityReport, drawing: Drawing, scale: float, strongest: float
 ) -> tuple[tuple[Surface, ...], Lines, str]:
-    load = unit_load(report)
-    if load is None or scale == 0.0:
+    load, field = unit_load(report), worst_field(report)
+    if load is None or field is None or scale == 0.0:
         body, edges = model_layers(drawing, drawing.points)
         return body, edges, ""
     moved = deformed_points(report, drawing, load[1], scale)
     body, edges = model_layers(drawing, moved)
+    arrows, _ = load_arrows(report, drawing, field, scale, strongest)
     furthest = furthest_way(report, drawing, load[1]) / MM
-    return body, edges, f"; 1 N moves the furthest point {number(furthest)} mm"
+    surfaces = body if arrows is None else (*body, arrows)
+    return surfaces, edges, f"; 1 N moves the furthest point {number(furthest)} mm"
 
 
 def comparison_scene(
@@ -65,16 +69,21 @@ def comparison_scene(
     """
     drawings = [drawing_of(report.assembly) for report in reports]
     scale = common_scale(reports, drawings)
-    field = worst_field(reports[0])
+    # Arrows of one length for one load: measured by one diagonal, and by the strongest load of all.
+    diagonal = max(drawing.diagonal for drawing in drawings)
+    drawings = [replace(drawing, diagonal=diagonal) for drawing in drawings]
+    fields = [worst_field(report) for report in reports]
+    strongest = max((field.strongest for field in fields if field is not None), default=0.0)
     toward, up = sight(
         reports[0].assembly,
         np.concatenate(drawings[0].points),
         view=view,
-        movement=None if field is None else field.displacements,
+        movement=None if fields[0] is None else fields[0].displacements,
         aspect=1.0,
     )
     found = [
-        _layers(report, drawing, scale) for report, drawing in zip(reports, drawings, strict=True)
+        _layers(report, drawing, scale, strongest)
+        for report, drawing in zip(reports, drawings, strict=True)
     ]
     extent = [surface.points for body, _, _ in found for surface in body]
     camera = fit(np.concatenate([*extent, *(p for d in drawings for p in d.points)]), toward, up)
@@ -87,5 +96,8 @@ def comparison_scene(
         still = outline(drawing, drawing.points)
         panels.append(Panel(said, body, (edges, still), camera))
         legend.append(LegendItem("none", NEUTRAL, f"{caption}: {len(drawing.points)} parts{words}"))
+    if strongest > 0.0 and scale:
+        words = f"worst-case load, 1 N in all; longest arrow {number(strongest * 1e-3)} N per gram"
+        legend.insert(0, LegendItem("arrow", LOAD_COLOR, words))
     drawn = f"worst-case load of 1 N each, deformations drawn {scale:g} x" if scale else ""
     return Scene(reports[0].assembly.name, drawn, tuple(panels), tuple(legend), (1600, 900))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from technic.report.labels import place_labels
 from technic.report.scene import RGB, LegendItem, Panel, Scene
 from technic.units import PITCH
 
@@ -20,7 +21,11 @@ Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 _INK = (32, 36, 42)
 _GREY = (105, 112, 120)
 _RULE = (214, 218, 222)
+_MARK = (204, 18, 46)
 _MARGIN = 36
+_DISC = 13.0
+"""Half the height of a disc with a number or a word."""
+
 _SCALE_STRIP = 34
 """Height below the panels that belongs to the scale bars."""
 
@@ -133,11 +138,14 @@ class Sheet:
             x += 58
         self._ink.text((x, middle), text, font=self._words, fill=_INK, anchor="lm")
 
+    def _half(self, text: str) -> float:
+        """Return half the width of a disc with a word in it."""
+        return max(_DISC, 0.5 * self._width(text, self._small) + 7)
+
     def _disc(self, x: float, y: float, text: str, color: tuple[int, int, int]) -> None:
-        half = max(13.0, 0.5 * self._width(text, self._small) + 7)
-        self._ink.rounded_rectangle(
-            (x - half, y - 13, x + half, y + 13), radius=13, fill=color, outline="white", width=2
-        )
+        half = self._half(text)
+        disc = (x - half, y - _DISC, x + half, y + _DISC)
+        self._ink.rounded_rectangle(disc, radius=_DISC, fill=color, outline="white", width=2)
         self._ink.text((x, y), text, font=self._small, fill="white", anchor="mm")
 
     def place(
@@ -167,15 +175,16 @@ class Sheet:
     def _markers(self, panel: Panel, box: Box, pixels_per_metre: float) -> None:
         axes = panel.camera.axes()
         middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
-        spots: list[tuple[float, float, str]] = []
+        points = []
         for marker in panel.markers:
             right, up, _ = axes @ (marker.point - panel.camera.center) * pixels_per_metre
-            x, y = middle[0] + right, middle[1] - up
-            near = [k for k, spot in enumerate(spots) if np.hypot(spot[0] - x, spot[1] - y) < 34]
-            if near:
-                old = spots[near[0]]
-                spots[near[0]] = (old[0], old[1], f"{old[2]}, {marker.text}")
-            else:
-                spots.append((x, y, marker.text))
-        for x, y, text in spots:
-            self._disc(x, y, text, (204, 18, 46))
+            points.append((middle[0] + right, middle[1] - up))
+        sizes = [(2.0 * self._half(marker.text), 2.0 * _DISC) for marker in panel.markers]
+        placed = place_labels(points, sizes, box)
+        for (x, y), spot in zip(points, placed, strict=True):
+            if spot is not None and np.hypot(spot[0] - x, spot[1] - y) > _DISC:
+                self._ink.line([(x, y), spot], fill=_MARK, width=2)
+                self._ink.ellipse((x - 4, y - 4, x + 4, y + 4), fill=_MARK, outline="white")
+        for marker, spot in zip(panel.markers, placed, strict=True):
+            if spot is not None:
+                self._disc(*spot, marker.text, _MARK)

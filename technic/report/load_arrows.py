@@ -77,22 +77,28 @@ def load_samples(
 
 
 def load_arrows(
-    report: RigidityReport, drawing: Drawing, field: WorstField, scale: float
+    report: RigidityReport,
+    drawing: Drawing,
+    field: WorstField,
+    scale: float,
+    strongest: float | None = None,
 ) -> tuple[Surface | None, float]:
     """Return the arrows of the worst-case load and the largest load per mass (N/kg).
 
     The load on material is in proportion to how far the material goes. Arrows begin at the points
-    that they push, on the deformed shape.
+    that they push, on the deformed shape. The longest stands for `strongest` (N/kg): the largest load
+    of this model unless given.
     """
     samples = load_samples(report, drawing.diagonal, field, scale)
     if not samples:
         return None, 0.0
     ways = field.displacements[samples]
     largest = float(np.linalg.norm(ways, axis=1).max())
+    longest = largest if strongest is None else strongest / field.load_per_mass
     pieces = [
         arrow(
             start,
-            way / largest * ARROW_SHARE * drawing.diagonal,
+            way / longest * ARROW_SHARE * drawing.diagonal,
             ARROW_RADIUS * drawing.diagonal,
             LOAD_COLOR,
         )

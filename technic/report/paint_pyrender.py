@@ -22,6 +22,7 @@ from technic.report.canvas import (
     LIGHTS,
     Pixels,
     depth_shades,
+    far_first,
     half_height,
     nearest,
     see_through,
@@ -172,7 +173,7 @@ def paint(
     """
     eye = _Eye(panel, size)
     lift = _LIFT * eye.reach * eye.axes[2]
-    body = [_surface(s) for s in panel.surfaces if not s.on_top]
+    body = [_surface(s) for s in far_first(panel).surfaces if not s.on_top]
     arrows = [_surface(s) for s in panel.surfaces if s.on_top]
     if depth <= 0.0:
         body += [_lines(each, lift) for each in panel.lines if len(each.segments)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pyvista
@@ -13,6 +13,7 @@ from technic.report.canvas import (
     LIGHTS,
     Pixels,
     depth_shades,
+    far_first,
     half_height,
     nearest,
     see_through,
@@ -24,9 +25,6 @@ __all__ = ["paint", "warm_up"]
 
 _IN_FRONT = -66000.0
 """Depth offset (in units of the depth buffer) that lifts arrows over all parts."""
-
-_PEELS = 4
-"""Layers of glass-like parts behind each other that are drawn right."""
 
 
 def _cells(indices: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -157,10 +155,8 @@ def paint(
     plotter.enable_anti_aliasing(aa_type="msaa", multi_samples=4)
     for lines in panel.lines:
         _add_lines(plotter, lines)
-    for surface in panel.surfaces:
+    for surface in far_first(panel).surfaces:
         _add_surface(plotter, surface)
-    if any(surface.opacity < 1.0 for surface in panel.surfaces):
-        cast(Any, plotter.renderer).enable_depth_peeling(number_of_peels=_PEELS)
     plotter.reset_camera_clipping_range()
     image = _shot(plotter)
     if transparent:

@@ -39,6 +39,11 @@ class WorstField:
     weights: Array
     load_per_mass: float
 
+    @property
+    def strongest(self) -> float:
+        """The largest load on the material (N/kg)."""
+        return float(np.linalg.norm(self.displacements, axis=1).max()) * self.load_per_mass
+
     def furthest(self, part: int) -> Array | None:
         """Return the displacement of the sample of a part that goes furthest; None without samples."""
         mine = self.displacements[self.parts == part]

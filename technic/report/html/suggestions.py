@@ -102,14 +102,6 @@ def _work(report: RigidityReport) -> float:
     return 0.0 if report.rigidity is None else 0.5e6 / report.rigidity.value
 
 
-def _strongest(report: RigidityReport) -> float:
-    """Return the strongest worst load of 1 N on the material (N/kg)."""
-    field = worst_field(report)
-    if field is None:
-        return 0.0
-    return float(np.linalg.norm(field.displacements, axis=1).max()) * field.load_per_mass
-
-
 def _contents(
     reports: Sequence[RigidityReport],
     drawings: Sequence[Drawing],
@@ -121,10 +113,10 @@ def _contents(
     corners: Array = np.concatenate([corners_of(drawing.points) for drawing in drawings])
     low, high = corners.min(axis=0), corners.max(axis=0)
     middle = 0.5 * (low + high)
-    field = worst_field(first)
-    movement = None if field is None else field.displacements
+    fields = [worst_field(report) for report in reports]
+    movement = None if fields[0] is None else fields[0].displacements
     toward, _ = sight(first.assembly, corners, movement=movement, aspect=0.8)
-    strongest = max(_strongest(report) for report in reports)
+    strongest = max((field.strongest for field in fields if field is not None), default=0.0)
     known = {part.id for part in first.assembly.parts}
     models = []
     for report, drawing, caption in zip(reports, drawings, captions, strict=True):
