@@ -45,6 +45,16 @@ def calibrate(
         Path | None,
         typer.Option("--rigs", metavar="TOML", help="Your own rigs, beside the shipped ones."),
     ] = None,
+    draw: Annotated[
+        Path | None,
+        typer.Option(
+            "--draw", metavar="DIR", help="Draw the rigs in their poses; with --rigs only yours."
+        ),
+    ] = None,
+    install: Annotated[
+        bool,
+        typer.Option("--install", help="Use the table for all models from now on (your settings)."),
+    ] = False,
     base: Annotated[
         Path | None,
         typer.Option("--base", metavar="TOML", help="Table for all that is not measured."),
@@ -62,9 +72,15 @@ def calibrate(
     from technic.report.files import check_writable, write_atomic
     from technic.report.json import STDOUT
 
+    alone = "--template" if template is not None else "--draw" if draw is not None else ""
+    if alone and (install or any(x is not None for x in (readings, out, json, report))):
+        raise UsageError(f"{alone} stands alone: it needs no readings")
+    if template is not None and draw is not None:
+        raise UsageError("--template and --draw write different things: one after the other")
+    if draw is not None:
+        _draw(draw, rigs, quiet=quiet)
+        return
     if template is not None:
-        if any(x is not None for x in (readings, out, json, report)):
-            raise UsageError("--template stands alone: fill the table in, then calibrate with it")
         from technic.report.calibration_template import write_template
 
         for path in write_template(template):
@@ -81,11 +97,17 @@ def calibrate(
     from technic.report.json import write_json
     from technic.report.style import style_for
 
-    if out is not None:
+    if out is not None or install:
         from datetime import UTC, datetime
 
         table = calibration_toml(result, datetime.now(UTC).date().isoformat())
-        write_atomic(out, lambda path: _write(path, table))
+        if out is not None:
+            write_atomic(out, lambda path: _write(path, table))
+        if install:
+            from technic.commands.config import install_table
+
+            for path in install_table(table):
+                typer.echo(f"technic: settings: {path}", err=True)
     if report is not None:
         from technic.report.calibration_page import calibration_page
 
@@ -99,6 +121,32 @@ def calibrate(
     elif not quiet:
         for said in result.warnings:
             typer.echo(f"technic: warning: {said}", err=True)
+
+
+def _draw(folder: Path, rigs: Path | None, *, quiet: bool) -> None:
+    """Draw rigs in their poses into a folder."""
+    from calibration.errors import DataError
+    from calibration.rigs import read_rigs, shipped_rigs
+    from technic.errors import SchemaError
+    from technic.report.render import Painter
+    from technic.report.rig_picture import rig_scene
+
+    try:
+        known = shipped_rigs() if rigs is None else read_rigs(rigs)
+    except DataError as error:
+        raise SchemaError(error.faults, path=rigs) from error
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"{folder} cannot be made: {error.strerror}") from error
+    for name, rig in known.items():
+        painter = Painter()
+        try:
+            painter.draw(rig_scene(rig), folder / f"{name}.png")
+        finally:
+            painter.close()
+        if not quiet:
+            typer.echo(str(folder / f"{name}.png"))
 
 
 def _write(path: Path, text: str) -> None:

@@ -13,15 +13,18 @@ from pathlib import Path
 from typing import Final
 
 from technic.assembly.stiffness import StiffnessTable, read_table
-from technic.errors import InputError, SchemaError
+from technic.errors import InputError, SchemaError, UsageError
 from technic.folders import config_folder
 
-__all__ = ["NAME", "SHIPPED", "config_text", "table_in_force"]
+__all__ = ["NAME", "SHIPPED", "install_table", "table_in_force"]
 
 NAME: Final = "technic.toml"
 
 SHIPPED: Final = "shipped"
 """What ``--calibration`` takes for the table that comes with the program, whatever settings say."""
+
+_INSTALLED: Final = "stiffness.toml"
+"""The table that `technic calibrate --install` writes beside the user's settings."""
 
 _KEYS: Final = ("calibration",)
 
@@ -73,6 +76,29 @@ def _named(path: Path) -> str | None:
     return named
 
 
-def config_text(table: str) -> str:
-    """Return a settings file that names a table beside it."""
-    return f'# Settings of technic.\ncalibration = "{table}"\n'
+def install_table(text: str) -> list[Path]:
+    """Write a table into the user's settings, for all models.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+
+    Raises
+    ------
+    UsageError
+        The settings name another table, or cannot be written.
+    """
+    folder = config_folder()
+    table, settings = folder / _INSTALLED, folder / NAME
+    named = _named(settings) if settings.is_file() else None
+    if named not in (None, _INSTALLED):
+        raise UsageError(f"{settings} names the table {named!r} already; change it there")
+    written = {table: text, settings: f'# Settings of technic.\ncalibration = "{_INSTALLED}"\n'}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for path, content in written.items():
+            path.write_text(content, encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"{folder} cannot be written: {error.strerror}") from error
+    return list(written)

@@ -1,4 +1,4 @@
-"""What one needs to measure joints: empty table, schema, protocol, and the rigs to build."""
+"""What one needs to measure joints: empty table, schema, protocol, pictures, and the rigs to build."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import calibration
 from technic.errors import UsageError
 from technic.report.files import write_atomic
 
-__all__ = ["write_template"]
+__all__ = ["PICTURES", "write_template"]
 
 _FILES = (
     ("template", "readings.csv"),
@@ -17,6 +17,9 @@ _FILES = (
     ("template", "protocol.md"),
     ("rigs", "rigs.toml"),
 )
+
+PICTURES = "pictures"
+"""Folder of the rigs' pictures, which the protocol shows."""
 
 
 def write_template(folder: Path) -> list[Path]:
@@ -38,12 +41,15 @@ def write_template(folder: Path) -> list[Path]:
         (x for x in root.joinpath("rigs").iterdir() if x.name.endswith(".ldr")),
         key=lambda x: x.name,
     )
+    pictures = sorted(root.joinpath("template", PICTURES).iterdir(), key=lambda x: x.name)
     targets = [folder / source.name for source in sources]
-    there = [path.name for path in targets if path.exists()]
+    targets += [folder / PICTURES / picture.name for picture in pictures]
+    sources += pictures
+    there = [str(path.relative_to(folder)) for path in targets if path.exists()]
     if there:
         raise UsageError(f"{folder} already has {', '.join(there)}; name another directory")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        (folder / PICTURES).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"{folder} cannot be made: {error.strerror}") from error
     for source, target in zip(sources, targets, strict=True):

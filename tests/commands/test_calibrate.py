@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 import tomllib
 from html.parser import HTMLParser
@@ -10,6 +11,7 @@ from html.parser import HTMLParser
 import pytest
 
 import calibration
+from calibration.rigs import shipped_rigs
 from technic import cli
 
 PAIR = """0 Pair
@@ -53,6 +55,9 @@ def test_samples_say_that_they_are_synthetic_and_give_the_truth_back(run, sample
     truth = {
         "pins_synthetic.csv": {"shear": 65625.0, "tilt": 0.240},
         "axles_synthetic.csv": {"spin": 0.16, "tilt": 0.16, "shear": 1e4},
+        "studs_synthetic.csv": {"tilt": 0.16, "shear": 1e4},
+        "half_pins_synthetic.csv": {"tilt": 0.16, "shear": 1e4},
+        "taps_synthetic.csv": {"shear": 65625.0, "tilt": 0.240},
     }
     for name, values in truth.items():
         path = sample(name)
@@ -65,11 +70,12 @@ def test_samples_say_that_they_are_synthetic_and_give_the_truth_back(run, sample
         for motion, value in values.items():
             low, high = found[motion]["interval_95"]
             assert found[motion]["identifiable"]
-            # seven intervals of 95 %: one may miss by a little
+            # a dozen intervals of 95 %: one may miss by a little
             assert 0.97 * low < value < 1.03 * high
         count = sum(p["identifiable"] for p in content["parameters"])
         assert len(content["correlation"]["matrix"]) == count
-        assert len(content["residuals"]) == content["readings"] == 81
+        rows = [x for x in path.read_text().splitlines() if x[:1] not in ("#", "") and "," in x]
+        assert len(content["residuals"]) == content["readings"] == len(rows) - 1
         assert content["grid_search"]["agrees"]
 
 
@@ -131,17 +137,54 @@ def test_page_shows_every_reading_and_asks_for_nothing_from_outside(run, sample,
     HTMLParser().feed(text)
 
 
+def test_taps_are_told_beside_sags(run, sample, tmp_path):
+    page = tmp_path / "fit.html"
+    code, out, _ = run("calibrate", sample("taps_synthetic.csv"), "--report", page)
+    assert code == 0
+    assert "Frequencies scatter by" in out
+    assert "tapped with 50.0 g" in out
+    text = page.read_text(encoding="utf-8")
+    assert text.count("<svg") == 6
+    assert "measured (Hz)" in text
+    assert "measured (mm)" in text
+    _, out, _ = run("calibrate", sample("taps_synthetic.csv"), "--json", "-")
+    content = json.loads(out)
+    taps = [row for row in content["residuals"] if row["kind"] == "tap"]
+    assert len(taps) == 54
+    assert taps[0]["measured_mm"] is None
+    assert taps[0]["measured_hz"] == pytest.approx(taps[0]["predicted_hz"], rel=0.1)
+    assert 0.005 < content["tap_scatter"] < 0.02 < content["scatter"]
+
+
+def test_a_table_can_be_installed_for_all_models(run, sample, tmp_path, monkeypatch):
+    monkeypatch.setenv("TECHNIC_CONFIG", str(tmp_path / "settings"))
+    model = tmp_path / "pair.ldr"
+    model.write_text(PAIR)
+    code, out, err = run("calibrate", sample("pins_synthetic.csv"), "--install", "-q")
+    assert (code, out) == (0, "")
+    assert "stiffness.toml" in err
+    _, out, _ = run("analyze", model, "--json", "-")
+    found = json.loads(out)["stiffness_table"]
+    assert (found["name"], found["found"]) == ("pins_synthetic", "the user's settings")
+    assert run("calibrate", sample("pins_synthetic.csv"), "--install", "-q")[0] == 0
+    (tmp_path / "settings" / "technic.toml").write_text('calibration = "mine.toml"\n')
+    code, _, err = run("calibrate", sample("pins_synthetic.csv"), "--install", "-q")
+    assert code == 2
+    assert "mine.toml" in err
+
+
 def test_template_can_be_built_filled_and_calibrated(run, tmp_path):
     folder = tmp_path / "new" / "rig"
     code, out, err = run("calibrate", "--template", folder)
     assert (code, err) == (0, "")
-    names = {path.name for path in folder.iterdir()}
+    names = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
     assert {
         "readings.csv",
         "readings.schema.json",
         "protocol.md",
         "rigs.toml",
         "pin-pair.ldr",
+        "pictures/pin-pair.png",
     } <= names
     assert set(out.split()) == {str(folder / name) for name in names}
     assert run("calibrate", folder / "readings.csv", "--rigs", folder / "rigs.toml")[0] == 0
@@ -154,7 +197,19 @@ def test_template_can_be_built_filled_and_calibrated(run, tmp_path):
 def test_protocol_in_the_package_is_the_page_of_the_docs(repo):
     shipped = calibration.files().joinpath("template", "protocol.md").read_text("utf-8")
     page = (repo / "docs" / "calibration.md").read_text("utf-8")
-    assert page.startswith(shipped.rstrip())
+    # the pictures lie beside the protocol that is shipped
+    assert page.startswith(
+        shipped.rstrip().replace("(pictures/", "(../calibration/template/pictures/")
+    )
+    shown = set(re.findall(r"\(pictures/([a-z-]+)\.png\)", shipped))
+    assert shown == set(shipped_rigs())
+
+
+def test_every_rig_has_a_picture_that_is_small():
+    for name in shipped_rigs():
+        content = calibration.files().joinpath("template", "pictures", f"{name}.png").read_bytes()
+        assert content.startswith(b"\x89PNG")
+        assert len(content) < 60_000
 
 
 @pytest.mark.parametrize(
@@ -162,6 +217,9 @@ def test_protocol_in_the_package_is_the_page_of_the_docs(repo):
     [
         ("calibrate",),
         ("calibrate", "{csv}", "--template", "{dir}"),
+        ("calibrate", "{csv}", "--draw", "{dir}"),
+        ("calibrate", "--template", "{dir}", "--draw", "{dir}"),
+        ("calibrate", "--template", "{dir}", "--install"),
         ("calibrate", "{csv}", "--out", "/no/such/directory/x.toml"),
         ("calibrate", "{csv}", "--json", "/no/such/directory/x.json"),
     ],
