@@ -85,16 +85,18 @@ def sort_motions(kin: Kinematics, motions: ComponentMotions, component: int) -> 
     kept, trains = tie(kin, meshes, local)
     spinning, sliding = kept[MotionKind.SPINNING], kept[MotionKind.SLIDING]
     idle = motions.internal - len(structural) - spinning - sliding
-    out = [
-        replace(
-            _motion(
-                kin, component, MotionKind.STRUCTURAL, clusters, space.of_clusters(found.vector)
-            ),
-            order=found.order,
-            second_order=found.second_order,
-        )
-        for found in structural
-    ]
+    out: list[Motion] = []
+    for found in structural:
+        twists = space.of_clusters(found.vector)
+        moving = _motion(kin, component, MotionKind.STRUCTURAL, clusters, twists)
+        if not moving.freed_by:
+            # pins go along with what moves: their other ends give way
+            lifted = space.lift(motions, found.vector.ravel()) * kin.units
+            for along in (_with_fasteners(kin, moving.parts), list(motions.parts)):
+                rows = np.searchsorted(motions.parts, along)
+                freed_by = moving.freed_by or _freed_by(kin, along, lifted[rows])
+                moving = replace(moving, freed_by=freed_by)
+        out.append(replace(moving, order=found.order, second_order=found.second_order))
     for train in trains:
         out.append(_motion(kin, component, train.kind, list(train.clusters), train.twists))
     kinds = list(MotionKind)
@@ -180,6 +182,12 @@ def _motion(
         pitch=shape.pitch,
         component=component,
     )
+
+
+def _with_fasteners(kin: Kinematics, parts: tuple[int, ...]) -> list[int]:
+    """Return the parts and the fasteners joined to them."""
+    near = {p for k in {k for p in parts for k in kin.touching[p]} for p in kin.owners[k]}
+    return sorted({*parts, *(p for p in near if kin.assembly.parts[p].fastener)})
 
 
 def _freed_by(kin: Kinematics, parts: list[int], twists: Array) -> tuple[int, ...]:
