@@ -40,6 +40,7 @@ from technic.errors import UsageError
 from technic.geometry import Array
 from technic.rigidity.analyze import analyze
 from technic.rigidity.result import MotionKind, RigidityReport
+from technic.system.inverse import single_thread
 
 __all__ = ["suggest_bars"]
 
@@ -85,6 +86,10 @@ class _Found:
     forecast: Forecast
     exact: Forecast
     twins: int = 0
+
+
+_Kind = tuple[int, str, str]
+"""What mirror images share: motions removed, rigidity, length."""
 
 
 def suggest_bars(
@@ -136,11 +141,14 @@ def suggest_bars(
     name = _free_name(assembly)
     found = []
     chosen = _chosen(places, max(starts, count))
-    for n, start in enumerate(chosen, start=1):
-        end = _slide(model, pattern, rules, start, name)
-        if end is not None:
-            found.append(end)
-        tell("slide", n, len(chosen))
+    with single_thread():
+        kinds: dict[_Kind, list[_Start]] = {}
+        for start in chosen:
+            kinds.setdefault(_kind(model, pattern, start, name), []).append(start)
+        for n, alike in enumerate(kinds.values(), start=1):
+            end = _slide(model, pattern, rules, alike[0], name)
+            found.append(replace(end, twins=len(alike) - 1))
+            tell("slide", n, len(kinds))
     proven: list[BarSuggestion] = []
     for one in _distinct(found, pattern.size):
         if len(proven) == count:
@@ -281,9 +289,15 @@ def _chosen(places: Sequence[_Start], starts: int) -> list[_Start]:
     return out
 
 
-def _slide(
-    model: Reanalysis, pattern: Pattern, rules: Rules, start: _Start, name: str
-) -> _Found | None:
+def _kind(model: Reanalysis, pattern: Pattern, start: _Start, name: str) -> _Kind:
+    """Return what a bar shares with its mirror images: they need not slide as well."""
+    assembly = model.assembly
+    part, joints, _ = made_of(assembly, start.bar, pattern, name, len(assembly.parts))
+    exact = model.exact_with([part], joints)
+    return exact.removed, f"{exact.rigidity:.6g}", f"{start.bar.length:.6g}"
+
+
+def _slide(model: Reanalysis, pattern: Pattern, rules: Rules, start: _Start, name: str) -> _Found:
     """Let both ends of a bar slide to where the rigidity is highest."""
     assembly, (one, two) = model.assembly, start.tracks
     known: dict[Bar, Forecast] = {}
@@ -297,8 +311,7 @@ def _slide(
         return known[bar]
 
     begin = exact(start.bar)
-    if begin is None:
-        return None
+    assert begin is not None  # the grid has legal bars only
     lengths = np.array([one.length, two.length])
 
     def bar_at(x: Array) -> Bar:
@@ -343,7 +356,7 @@ def _distinct(found: Sequence[_Found], size: float) -> list[_Found]:
         for n, first in enumerate(out):
             near = abs(first.exact.rigidity - one.exact.rigidity) <= _SAME * first.exact.rigidity
             if near and abs(first.bar.length - one.bar.length) <= _SAME * first.bar.length:
-                out[n] = replace(first, twins=first.twins + 1)
+                out[n] = replace(first, twins=first.twins + one.twins + 1)
                 break
         else:
             out.append(one)

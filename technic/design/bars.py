@@ -19,6 +19,7 @@ from technic.assembly.joint_types import JointType
 from technic.assembly.model import Assembly, Joint, Part
 from technic.assembly.shapes import make_shape, section_size
 from technic.assembly.typed_joints import held_motions, joint_axes, stiffness_of
+from technic.design.apply import HIGHLIGHT
 from technic.errors import UsageError
 from technic.geometry import Array, Pose
 from technic.parts.definition import FrameBody, Material, TrussBody
@@ -301,6 +302,7 @@ def made_of(
         ports=(),
         body=made.body,
         mass_properties=made.mass_properties,
+        color=HIGHLIGHT,
         shape={**shape, "material": pattern.material.name},
     )
     row: dict[str, Any] = {"id": name, "shape": shape}

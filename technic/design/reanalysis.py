@@ -33,7 +33,6 @@ from technic.system.inverse import (
     LOCAL,
     SHIFT,
     SHIFT_SHARE,
-    single_thread,
 )
 from technic.system.part_models import FACTORIES, PartModel
 from technic.units import PITCH
@@ -127,6 +126,8 @@ class Reanalysis:
     def exact(self, change: Change) -> Forecast:
         """Return what a change does: motions of structure that go, and the rigidity.
 
+        Call it within `technic.system.inverse.single_thread`: small matrices, many of them.
+
         The rigidity is that of the heaviest piece of the reinforced model (N/m), infinite when it
         has no elastic mode.
         """
@@ -148,10 +149,9 @@ class Reanalysis:
         gone : frozenset of int
             Each has a new part in its place that holds the same motions.
         """
-        with single_thread():
-            made = Remade(self, new, joints, gone)
-            removed = made.move()
-            return Forecast(removed, made.lowest(made.main_piece()))
+        made = Remade(self, new, joints, gone)
+        removed = made.move()
+        return Forecast(removed, made.lowest(made.main_piece()))
 
     def new_joints(self, new: Sequence[Part], gone: frozenset[int]) -> list[Joint]:
         """Return the joints of new parts; new part k has the index of the k-th after the present ones.

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from technic.assembly.model import Assembly, Part
-from technic.report.camera import fit, view_direction
+from technic.report.camera import fit, sight
 from technic.report.drawing import drawing_of
 from technic.report.palette import color_name, color_rgb
 from technic.report.picture import headline, model_layers
@@ -37,7 +37,7 @@ def before_after_scene(before: RigidityReport, after: RigidityReport) -> Scene:
     new = [k for k, part in enumerate(after.assembly.parts) if part.id not in known]
     drawing = drawing_of(after.assembly)
     everything = np.concatenate(drawing.points)
-    camera = fit(everything, view_direction(everything, None, _HALF))
+    camera = fit(everything, *sight(after.assembly, everything, aspect=_HALF))
     color = after.assembly.parts[new[0]].color if new else None
     title, subtitle = headline(after)
     legend: tuple[LegendItem, ...] = ()
