@@ -97,16 +97,20 @@ def find_clusters(kin: Kinematics, motions: ComponentMotions, links: list[int]) 
                 outer[n].append(k)
     bonds = _bonds(kin, motions, first, outer, home)
     groups = connected_groups(range(len(first)), bonds)
-    clusters = []
-    for group in groups:
-        parts = tuple(sorted(p for n in group for p in first[n]))
+    members = [tuple(sorted(p for n in group for p in first[n])) for group in groups]
+    ties = []
+    for group, parts in zip(groups, members, strict=True):
         inside = set(parts)
-        ties = tuple(
-            k
-            for k in sorted({k for n in group for k in outer[n]})
-            if len(kin.owners[k]) == 1 or not inside.issuperset(kin.owners[k])
+        ties.append(
+            tuple(
+                k
+                for k in sorted({k for n in group for k in outer[n]})
+                if len(kin.owners[k]) == 1 or not inside.issuperset(kin.owners[k])
+            )
         )
-        clusters.append(_cluster(kin, parts, ties))
+    references = np.array([kin.origins[list(parts)].mean(axis=0) for parts in members])
+    locals_ = _local_motions(kin, members, references, ties)
+    clusters = [_cluster(kin, *row) for row in zip(members, references, ties, locals_, strict=True)]
     return sorted(clusters, key=lambda c: (c.fasteners_only, -c.mass, c.parts))
 
 
@@ -181,9 +185,14 @@ def _largest(
     return np.asarray(sums.max(axis=1).toarray()).reshape(len(parts), 6)
 
 
-def _cluster(kin: Kinematics, parts: tuple[int, ...], outer: tuple[int, ...]) -> Cluster:
+def _cluster(
+    kin: Kinematics,
+    parts: tuple[int, ...],
+    reference: Array,
+    outer: tuple[int, ...],
+    local: tuple[LocalMotion, ...],
+) -> Cluster:
     members = [kin.assembly.parts[p] for p in parts]
-    reference = kin.origins[list(parts)].mean(axis=0)
     return Cluster(
         parts=parts,
         reference=reference,
@@ -191,34 +200,49 @@ def _cluster(kin: Kinematics, parts: tuple[int, ...], outer: tuple[int, ...]) ->
         outer=outer,
         fasteners_only=all(m.fastener for m in members),
         mass=sum(m.mass_properties.mass for m in members if not m.fastener),
-        local=_local_motions(kin, set(parts), reference, outer),
+        local=local,
     )
 
 
 def _local_motions(
-    kin: Kinematics, parts: set[int], reference: Array, outer: tuple[int, ...]
-) -> tuple[LocalMotion, ...]:
-    """Return the motions of the cluster alone, translations apart from rotations."""
-    blocks = []
-    for k in outer:
-        for side, p in enumerate(kin.owners[k]):
-            if p in parts:
-                arm = (kin.origins[p] - reference) / kin.length
-                blocks.append(kin.sides[k, side][kin.held[k]] @ shift_twist(arm))
-    if not blocks:
-        return ()
+    kin: Kinematics,
+    members: list[tuple[int, ...]],
+    references: Array,
+    outer: list[tuple[int, ...]],
+) -> list[tuple[LocalMotion, ...]]:
+    """Return the motions of each cluster alone, translations apart from rotations."""
+    home = {p: n for n, parts in enumerate(members) for p in parts}
+    sides = [
+        (n, k, s, p)
+        for n, links in enumerate(outer)
+        for k in links
+        for s, p in enumerate(kin.owners[k])
+        if home.get(p) == n
+    ]
     dofs = kin.dofs
-    rows = np.vstack(blocks)[:, dofs]
-    _, values, vt = np.linalg.svd(rows, full_matrices=True)
-    values = np.concatenate([values, np.zeros(len(dofs) - len(values))])
-    free = np.zeros((6, int(np.sum(values < MOTION_KIND_CUT))))
-    free[dofs] = vt[values < MOTION_KIND_CUT].T
+    squares = np.zeros((len(members), len(dofs), len(dofs)))
+    if sides:
+        own, link, side, part = np.array(sides).T
+        carry = shift_twist((kin.origins[part] - references[own]) / kin.length)
+        rows = (kin.sides[link, side] * kin.held[link][..., None]) @ carry
+        rows = rows[..., dofs]
+        np.add.at(squares, own, np.swapaxes(rows, 1, 2) @ rows)
+    values, vectors = np.linalg.eigh(squares)
+    out = []
+    for n, links in enumerate(outer):
+        free = np.zeros((6, int(np.sum(values[n] < MOTION_KIND_CUT**2))))
+        free[dofs] = vectors[n][:, values[n] < MOTION_KIND_CUT**2]
+        out.append(_apart(free) if links else ())
+    return out
+
+
+def _apart(free: Array) -> tuple[LocalMotion, ...]:
+    """Return motions, the columns of `free`, combined so that translations stand apart from rotations."""
     if free.shape[1] == 0:
         return ()
     _, turning, mix = np.linalg.svd(free[3:], full_matrices=True)
     turning = np.concatenate([turning, np.zeros(free.shape[1] - len(turning))])
-    motions = []
-    for t, combination in zip(turning, mix, strict=True):
-        twist = free @ combination
-        motions.append(LocalMotion(bool(t > MOTION_KIND_CUT), twist))
-    return tuple(motions)
+    return tuple(
+        LocalMotion(bool(t > MOTION_KIND_CUT), free @ combination)
+        for t, combination in zip(turning, mix, strict=True)
+    )

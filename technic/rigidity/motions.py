@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from technic.geometry import Array, shift_twist
+from technic.geometry import Array, cross, shift_twist
 from technic.rigidity.clusters import Cluster, LocalMotion, find_clusters
 from technic.rigidity.kinematics import ComponentMotions, Kinematics, component_motions
 from technic.rigidity.order import FIRST_ORDER, split_by_order
@@ -112,7 +112,7 @@ def _local_kind(kin: Kinematics, cluster: Cluster, motion: LocalMotion) -> Motio
         return MotionKind.IDLE
     parts = [kin.assembly.parts[p] for p in cluster.parts]
     axis = motion.twist[3:] / np.linalg.norm(motion.twist[3:])
-    point = cluster.reference + kin.length * np.cross(axis, motion.twist[:3]) / np.linalg.norm(
+    point = cluster.reference + kin.length * cross(axis, motion.twist[:3]) / np.linalg.norm(
         motion.twist[3:]
     )
     balls = _ball_centers(kin, cluster)
@@ -123,13 +123,13 @@ def _local_kind(kin: Kinematics, cluster: Cluster, motion: LocalMotion) -> Motio
     return MotionKind.STRUCTURAL
 
 
-def _ball_centers(kin: Kinematics, cluster: Cluster) -> Array | None:
+def _ball_centers(kin: Kinematics, cluster: Cluster) -> set[tuple[float, ...]] | None:
     """Return the distinct centres when all joints of the cluster are balls, else None."""
     joints = kin.assembly.joints
     if any(k >= len(joints) or joints[k].held[3:].any() for k in cluster.outer):
         return None
-    points = np.array([joints[k].point for k in cluster.outer])
-    return np.unique(points.round(6), axis=0)
+    points = np.array([joints[k].point for k in cluster.outer]).reshape(-1, 3)
+    return set(map(tuple, (points.round(6) + 0.0).tolist()))
 
 
 def _one_line(kin: Kinematics, cluster: Cluster) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from technic.geometry import Array, shift_twist
+from technic.geometry import Array, cross, shift_twist
 from technic.rigidity.result import MotionType
 from technic.tolerances import MOTION_KIND_CUT
 
@@ -52,7 +52,7 @@ def describe_twists(points: Array, twists: Array, length: float) -> TwistShape:
         return TwistShape(MotionType.TRANSLATION, None, u / np.linalg.norm(u), 0.0)
     direction = theta / angle
     pitch = float(u @ direction) / angle
-    point = middle + np.cross(direction, u) / angle
+    point = middle + cross(direction, u) / angle
     if abs(pitch) < MOTION_KIND_CUT * length:
         return TwistShape(MotionType.ROTATION, point, direction, 0.0)
     return TwistShape(MotionType.SCREW, point, direction, pitch)

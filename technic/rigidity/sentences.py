@@ -8,7 +8,7 @@ import numpy as np
 
 from technic.assembly.joint_types import JointType
 from technic.assembly.model import Assembly, FindingKind, Part
-from technic.geometry import Array
+from technic.geometry import Array, cross
 from technic.parts.definition import PortKind
 from technic.rigidity.result import Mobility, Motion, MotionKind, MotionType, Verdict
 from technic.rigidity.screw import describe_twists
@@ -46,7 +46,7 @@ def _groups(assembly: Assembly, motion: Motion) -> list[tuple[list[int], Array]]
     origins = np.array([assembly.parts[p].centroid for p in motion.parts])
     # the twist of each part's field at the model's origin is the same for parts that move as one
     moved = motion.twists.copy()
-    moved[:, :3] -= np.cross(motion.twists[:, 3:], origins)
+    moved[:, :3] -= cross(motion.twists[:, 3:], origins)
     reach = max(float(np.abs(origins).max()), MOBILITY_LENGTH)
     size = MOTION_KIND_CUT * np.array([reach / MOBILITY_LENGTH] * 3 + [1 / MOBILITY_LENGTH] * 3)
     groups: list[list[int]] = []
