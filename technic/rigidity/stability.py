@@ -25,7 +25,7 @@ from technic.geometry import Array
 from technic.rigidity.result import Mode, SpotRange, Stability, WeakSpot
 from technic.system.assemble import System
 from technic.system.inverse import shifted_inverse, single_thread
-from technic.system.parameters import Parameter, parameter_rows
+from technic.system.parameters import Parameter, parameter_shares
 
 __all__ = ["DRAWS", "Pencil", "draw", "stability"]
 
@@ -43,6 +43,10 @@ _SEED: Final = 20220411
 
 _SAME: Final = 1e-10
 """Shapes closer than this to those before them bring nothing but rounding."""
+
+
+_Rows = tuple[NDArray[np.int64], NDArray[np.int64], Array]
+"""Joint motions whose stiffness was measured; see `technic.system.parameters.parameter_shares`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,17 +106,16 @@ def stability(
     """
     if table is None or not table.measured or not modes:
         return None
-    rows, owner = parameter_rows(system, tuple(Parameter(*name) for name in table.measured))
-    finite = system.elastic[rows]
-    rows, owner = rows[finite], owner[finite]
+    known = parameter_shares(system, tuple(Parameter(*name) for name in table.measured))
+    rows, owner, share = known
     if not len(rows):
         return None
     with single_thread():
-        shapes = _shapes(system, pencil, modes, rows, owner)
+        shapes = _shapes(system, pencil, modes, known)
         changes = draw(table)
-        mixed = _worst_of_each(system, pencil, shapes, rows, owner, changes)
+        mixed = _worst_of_each(system, pencil, shapes, known, changes)
     factors = np.ones((system.A.shape[0], len(changes)))
-    factors[rows] = np.exp(changes[:, owner]).T
+    np.add.at(factors, rows, share[:, None] * np.expm1(changes[:, owner]).T)
     blocks = [slice(k, k + _BLOCK) for k in range(0, len(changes), _BLOCK)]
     shares = np.hstack(
         [
@@ -146,13 +149,13 @@ def _shapes(
     system: System,
     pencil: Pencil,
     modes: Sequence[Mode],
-    rows: NDArray[np.int64],
-    owner: NDArray[np.int64],
+    measured: _Rows,
 ) -> Array:
     """Return the shapes over the component's unknowns, M-orthonormal, (n, d)."""
+    rows, owner, share = measured
     known = np.column_stack([mode.unknowns[pencil.own] for mode in modes])
     a = sparse.csr_array(system.A[rows][:, pencil.own])
-    pull = system.rows.stiffness[rows] * (a @ known[:, 0])
+    pull = share * system.rows.stiffness[rows] * (a @ known[:, 0])
     # small beside the lowest eigenvalue: the answer is a shape to try, not a result
     inverse = shifted_inverse(
         pencil.stiffness,
@@ -181,14 +184,14 @@ def _worst_of_each(
     system: System,
     pencil: Pencil,
     shapes: Array,
-    rows: NDArray[np.int64],
-    owner: NDArray[np.int64],
+    measured: _Rows,
     changes: Array,
 ) -> Array:
     """Return the worst mode of every draw in terms of the shapes, (d, draws)."""
+    rows, owner, share = measured
     base = shapes.T @ (pencil.stiffness @ shapes)
     a = np.asarray(system.A[rows][:, pencil.own] @ shapes)
-    weighted = system.rows.stiffness[rows][:, None] * a
+    weighted = (share * system.rows.stiffness[rows])[:, None] * a
     parameters = changes.shape[1]
     joints = np.array([a[owner == p].T @ weighted[owner == p] for p in range(parameters)])
     every = base + np.einsum("mp,pij->mij", np.expm1(changes), joints)

@@ -15,7 +15,7 @@ import numpy as np
 from technic.assembly.stiffness import StiffnessTable
 from technic.geometry import Array
 from technic.system.assemble import System
-from technic.system.parameters import Parameter, parameter_rows
+from technic.system.parameters import Parameter, parameter_shares
 
 __all__ = ["NORMAL_95", "energy_shares", "rigidity_interval"]
 
@@ -28,12 +28,10 @@ def energy_shares(system: System, x: Array, parameters: tuple[Parameter, ...]) -
 
     It is the derivative of the logarithm of the eigenvalue per logarithm of the stiffness.
     """
-    rows, owner = parameter_rows(system, parameters)
-    elastic = system.elastic[rows]
-    rows, owner = rows[elastic], owner[elastic]
+    rows, owner, share = parameter_shares(system, parameters)
     stretch = system.A[rows] @ x
     shares = np.zeros(len(parameters))
-    np.add.at(shares, owner, system.rows.stiffness[rows] * stretch**2)
+    np.add.at(shares, owner, share * system.rows.stiffness[rows] * stretch**2)
     return shares / float(x @ (system.K @ x) + x @ (system.J @ x))
 
 

@@ -12,7 +12,7 @@ from technic.assembly.stiffness import StiffnessTable
 from technic.rigidity.uncertainty import NORMAL_95
 from technic.statics.solve import Deflection, Load, deflect
 from technic.system.assemble import ElementFactory, Probe, solid_element_of
-from technic.system.parameters import Parameter, parameter_rows
+from technic.system.parameters import Parameter, parameter_shares
 
 __all__ = ["displacement_interval"]
 
@@ -49,9 +49,9 @@ def displacement_interval(
     if not table.measured or size == 0.0:
         return None
     system = answer.system
-    rows, owner = parameter_rows(system, tuple(Parameter(*name) for name in table.measured))
-    elastic = system.elastic[rows]
-    rows, owner = rows[elastic], owner[elastic]
+    rows, owner, share = parameter_shares(
+        system, tuple(Parameter(*name) for name in table.measured)
+    )
     if not len(rows):
         return None
     still = np.zeros(3)
@@ -62,7 +62,8 @@ def displacement_interval(
     g = deflect(system.assembly, tuple(unit), element=element).unknowns
     a = system.A[rows]
     slope = np.zeros(len(table.measured))
-    np.add.at(slope, owner, -system.rows.stiffness[rows] * (a @ g) * (a @ answer.unknowns))
+    pull = share * system.rows.stiffness[rows] * (a @ answer.unknowns)
+    np.add.at(slope, owner, -(a @ g) * pull)
     # in the logarithm, so that the interval never reaches below zero
     deviation = float(np.sqrt(slope @ table.log_covariance @ slope)) / size
     half = float(np.exp(NORMAL_95 * deviation))

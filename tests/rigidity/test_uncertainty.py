@@ -12,7 +12,7 @@ from technic.errors import SchemaError
 from technic.loading import load
 from technic.rigidity.analyze import analyze
 from technic.rigidity.uncertainty import energy_shares
-from technic.system.assemble import assemble
+from technic.system.assemble import assemble, element_of
 from technic.system.parameters import Parameter
 
 PAIR = """0 Pair of 5L beams, two pins
@@ -77,6 +77,39 @@ def test_energy_shares_are_the_derivatives(pair, table):
             np.log(rigidity(pair, changed(table, np.exp(s * step * np.eye(2)[k])))) for s in (1, -1)
         )
         assert shares[k] == pytest.approx((up - down) / (2 * step), rel=1e-4)
+
+
+def test_studs_that_act_together_share_their_stiffnesses(tmp_path):
+    # two bricks on two plates: rows of rotation are made of axial, shear and tilt through lever arms
+    path = tmp_path / "studs.ldr"
+    path.write_text(
+        "0 Studs\n1 4 0 0 0 1 0 0 0 1 0 0 0 1 3001.dat\n"
+        "1 4 40 -24 20 1 0 0 0 1 0 0 0 1 3001.dat\n1 4 0 -24 -20 1 0 0 0 1 0 0 0 1 3001.dat\n"
+    )
+    motions = ("axial", "shear", "tilt")
+    parameters = tuple(Parameter("stud/tube", name) for name in motions)
+
+    def value(factors):
+        entry = default_table().get("stud/tube")
+        values = {
+            name: StiffnessValue(factor * entry.values[name].value, "test")
+            for name, factor in zip(motions, factors, strict=True)
+        }
+        connections = {**default_table().connections, "stud/tube": replace(entry, values=values)}
+        table = replace(default_table(), connections=connections)
+        return analyze(load(path, table=table), modes=1, parts="frame")
+
+    uneven = np.array([1.0, 0.7, 3.0])
+    report = value(uneven)
+    system = assemble(report.assembly, element=element_of)
+    shares = energy_shares(system, report.modes[0].unknowns, parameters)
+    step = 1e-4
+    for k in range(3):
+        up, down = (
+            np.log(value(uneven * np.exp(s * step * np.eye(3)[k])).rigidity.value) for s in (1, -1)
+        )
+        assert shares[k] == pytest.approx((up - down) / (2 * step), rel=1e-3, abs=1e-6)
+    assert np.all(shares > 1e-4)
 
 
 def test_delta_method_agrees_with_monte_carlo(pair, table):
