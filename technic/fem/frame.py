@@ -221,7 +221,46 @@ BENDING: Any = (
 )
 """Places of the unknowns of bending in the plane of x and y, then of x and z; sign of the rotation."""
 
-POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
+_DEFLECTION = (
+    np.array(
+        [[1.0, 0.0, -3.0, 2.0], [0.0, 1.0, -2.0, 1.0], [0.0, 0.0, 3.0, -2.0], [0.0, 0.0, -1.0, 1.0]]
+    ),
+    np.array(
+        [[1.0, -1.0, 0.0, 0.0], [0.0, 0.5, -0.5, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, -0.5, 0.5, 0.0]]
+    ),
+)
+"""Deflection along a member for a unit of each unknown, as powers of the place between 0 and 1: of a slender
+member, and what the shear ratio adds; both over one plus that ratio. Rows of rotations are per length."""
+
+_ROTATION = (
+    np.array([[0.0, -6.0, 6.0], [1.0, -4.0, 3.0], [0.0, 6.0, -6.0], [0.0, -2.0, 3.0]]),
+    np.array([[0.0, 0.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+)
+"""The same of the rotation of the section; rows of deflections are over the length."""
+
+
+def _products(shapes: tuple[Array, Array]) -> Array:
+    """Return the integrals of products of shape functions, (3, 4, 4): factors of powers of the ratio."""
+    powers = np.arange(shapes[0].shape[1])
+    weights = 1.0 / (powers[:, None] + powers + 1.0)
+    one, two = shapes
+    return np.array(
+        [
+            one @ weights @ one.T,
+            one @ weights @ two.T + two @ weights @ one.T,
+            two @ weights @ two.T,
+        ]
+    )
+
+
+_DEFLECTION_PRODUCTS, _ROTATION_PRODUCTS = _products(_DEFLECTION), _products(_ROTATION)
+
+_BENT = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]], dtype=float)
+_SHEARED = np.zeros((4, 4))
+_SHEARED[1::2, 1::2] = [[1.0, -1.0], [-1.0, 1.0]]
+"""Stiffness in bending of a member of unit length: slender, and what the shear ratio adds."""
+
+_PAIR = np.array([[1.0, -1.0], [-1.0, 1.0]])
 
 
 def _bending(section: Section) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -238,24 +277,21 @@ def local_stiffness(lengths: Array, section: Section, material: Material) -> Arr
     """Return the stiffness of members in their own axes, (m, 12, 12); lengths may be complex."""
     e, g = material.young_pa, material.shear_pa
     k = np.zeros((len(lengths), 12, 12), dtype=lengths.dtype)
-    pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    k[:, *AXIAL] = (e * section.area / lengths)[:, None, None] * pair
-    k[:, *TORSION] = (g * section.torsion / lengths)[:, None, None] * pair
+    k[:, *AXIAL] = (e * section.area / lengths)[:, None, None] * _PAIR
+    k[:, *TORSION] = (g * section.torsion / lengths)[:, None, None] * _PAIR
     for (place, sign), (inertia, shear) in zip(BENDING, _bending(section), strict=True):
-        phi = _shear_ratio(lengths, inertia, shear, material)
-        s, one = sign * lengths, np.ones_like(lengths)
-        a, b = (4.0 + phi) * s * s, (2.0 - phi) * s * s
-        block = np.array(
-            [
-                [12 * one, 6 * s, -12 * one, 6 * s],
-                [6 * s, a, -6 * s, b],
-                [-12 * one, -6 * s, 12 * one, -6 * s],
-                [6 * s, b, -6 * s, a],
-            ]
-        )
-        scale = e * inertia / (lengths**3 * (1.0 + phi))
-        k[:, *place] = np.moveaxis(block, 2, 0) * scale[:, None, None]
+        phi = _shear_ratio(lengths, inertia, shear, material)[:, None, None]
+        arms = _arms(sign * lengths)
+        scale = e * inertia / (lengths[:, None, None] ** 3 * (1.0 + phi))
+        k[:, *place] = scale * (_BENT + phi * _SHEARED) * arms
     return k
+
+
+def _arms(lengths: Array) -> Array:
+    """Return what turns unknowns per unit length into deflections, for products: (m, 4, 4)."""
+    arms = np.ones((len(lengths), 4), dtype=lengths.dtype)
+    arms[:, 1::2] = lengths[:, None]
+    return np.asarray(arms[:, :, None] * arms[:, None, :])
 
 
 def local_mass(lengths: Array, section: Section, material: Material) -> Array:
@@ -265,25 +301,13 @@ def local_mass(lengths: Array, section: Section, material: Material) -> Array:
     linear = lengths[:, None, None] / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]])
     m[:, *AXIAL] = rho * section.area * linear
     m[:, *TORSION] = rho * (section.inertia_y + section.inertia_z) * linear
-    xi = (POINTS + 1.0) / 2.0
-    weights = WEIGHTS / 2.0 * lengths[:, None]
     for (place, sign), (inertia, shear) in zip(BENDING, _bending(section), strict=True):
-        phi = _shear_ratio(lengths, inertia, shear, material)[:, None]
-        s = sign * lengths[:, None]
-        deflection = [
-            1 - 3 * xi**2 + 2 * xi**3 + phi * (1 - xi),
-            s * (xi - 2 * xi**2 + xi**3 + phi / 2 * (xi - xi**2)),
-            3 * xi**2 - 2 * xi**3 + phi * xi,
-            s * (-(xi**2) + xi**3 - phi / 2 * (xi - xi**2)),
-        ]
-        rotation = [
-            6 * (xi**2 - xi) / s,
-            1 - 4 * xi + 3 * xi**2 + phi * (1 - xi),
-            6 * (xi - xi**2) / s,
-            3 * xi**2 - 2 * xi + phi * xi,
-        ]
-        w = np.stack(deflection, axis=1) / (1.0 + phi[..., None])
-        t = np.stack(rotation, axis=1) / (1.0 + phi[..., None])
-        m[:, *place] = rho * section.area * (w * weights[:, None]) @ np.swapaxes(w, 1, 2)
-        m[:, *place] += rho * inertia * (t * weights[:, None]) @ np.swapaxes(t, 1, 2)
+        phi = _shear_ratio(lengths, inertia, shear, material)[:, None, None]
+        ratios = np.stack([np.ones_like(phi), phi, phi**2], axis=1) / (1.0 + phi[:, None]) ** 2
+        size = lengths[:, None, None]
+        arms = _arms(sign * lengths)
+        m[:, *place] = (
+            rho * section.area * size * arms * (ratios * _DEFLECTION_PRODUCTS).sum(axis=1)
+        )
+        m[:, *place] += rho * inertia / size * arms * (ratios * _ROTATION_PRODUCTS).sum(axis=1)
     return m
