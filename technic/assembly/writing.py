@@ -13,7 +13,6 @@ import numpy as np
 from technic.assembly.file import HELD_NAMES, SCHEMA
 from technic.assembly.joint_types import JointType
 from technic.assembly.model import Assembly, Joint, Part, Support
-from technic.assembly.stiffness import default_table
 from technic.assembly.typed_joints import stiffness_to_file
 from technic.errors import UsageError
 from technic.geometry import Array, Pose
@@ -45,7 +44,7 @@ def to_document(assembly: Assembly) -> dict[str, Any]:
     """Return an assembly as the JSON object of its file.
 
     Joints are written with the stiffness that they have, defaults and play included, and with where it
-    comes from.
+    comes from; those that name a connection of the stiffness table, with that name.
 
     Raises
     ------
@@ -150,21 +149,14 @@ def _joint(assembly: Assembly, joint: Joint) -> dict[str, Any]:
         row["axis"] = _numbers(joint.axes[0])
         if joint.type is JointType.SLOT:
             row["axis2"] = _numbers(joint.axes[1])
-    if _is_of_table(joint):
+    if joint.connection != joint.type.value:
+        # its stiffness is the table's, whichever is in force when the file is read
         row["connection"] = joint.connection
         return row
     row["stiffness"] = stiffness_to_file(joint.held, joint.stiffness)
     if joint.provenance:
         row["provenance"] = joint.provenance
     return row
-
-
-def _is_of_table(joint: Joint) -> bool:
-    """Whether reading the joint's connection from the shipped table gives the same joint."""
-    entry = default_table().connections.get(joint.connection)
-    if entry is None or joint.provenance != entry.provenance(joint.held):
-        return False
-    return bool(np.array_equal(joint.stiffness[joint.held], entry.vector()[joint.held]))
 
 
 def _support(assembly: Assembly, support: Support) -> dict[str, Any]:

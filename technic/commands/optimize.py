@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from technic.commands.options import JsonOption, PictureOption, QuietOption
+from technic.commands.options import AS_FOUND, JsonOption, PictureOption, QuietOption
+from technic.commands.reading import reading
 
 if TYPE_CHECKING:
     from technic.design.optimize.solve import Optimization, Step
@@ -111,7 +112,7 @@ def optimize(
     ):
         if target is not None:
             check_writable(target)
-    model = load(assembly)
+    model = load(assembly, **reading(assembly, AS_FOUND))
     names, rules = ({}, {}) if vertices is None else read_rules(vertices, model)
     rules |= dict.fromkeys(fix or (), Rule("fixed"))
     if list_vertices:

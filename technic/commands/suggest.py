@@ -42,6 +42,7 @@ class _Wishes:
     box: tuple[float, float, float, float, float, float] | None
     lengths: str | None
     straight: bool
+    also: str | None
     snug: float
     inventory: Path | None
     max_parts: int | None
@@ -64,6 +65,9 @@ def _filters(assembly: Assembly, wishes: _Wishes) -> Filters:
     if wishes.box is not None:
         x = [v * LDU for v in wishes.box]
         box = ((x[0], x[1], x[2]), (x[3], x[4], x[5]))
+    also = [word.strip() for word in (wishes.also or "").split(",") if word.strip()]
+    if unknown := sorted(set(also) - {"thin", "frames"}):
+        raise UsageError(f"--also takes thin and frames, not {unknown[0]!r}")
     inventory = None
     if wishes.inventory is not None:
         try:
@@ -75,6 +79,8 @@ def _filters(assembly: Assembly, wishes: _Wishes) -> Filters:
         box=box,
         lengths=_lengths(wishes.lengths),
         bent=not wishes.straight,
+        thin="thin" in also,
+        frames="frames" in also,
         snug=wishes.snug * MM,
         inventory=inventory,
         max_parts=wishes.max_parts,
@@ -197,6 +203,10 @@ def suggest(
         typer.Option("--lengths", metavar="5,7,...", help="Only straight beams of these lengths."),
     ] = None,
     straight: Annotated[bool, typer.Option("--straight", help="No bent beams.")] = False,
+    also: Annotated[
+        str | None,
+        typer.Option("--also", metavar="thin,frames", help="Thin beams, frames as well."),
+    ] = None,
     snug: Annotated[
         float,
         typer.Option(
@@ -280,10 +290,11 @@ def suggest(
         if path is not None:
             check_writable(path)
     if model.suffix.lower() == ".json":
-        reading(model, how)  # refuses what says nothing about an assembly file
+        options = reading(model, how)  # refuses what says nothing about an assembly file
         lego = {
             "--lengths": lengths,
             "--straight": straight,
+            "--also": also,
             "--snug": snug,
             "--inventory": inventory,
             "--max-parts": max_parts,
@@ -294,6 +305,7 @@ def suggest(
         _refuse(lego, "for LDraw models; an assembly file gets new bars")
         suggest_for_linkage(
             model,
+            options,
             BarWishes(
                 between=between,
                 box=box,
@@ -316,7 +328,7 @@ def suggest(
     options = reading(model, how)
     assembly = load(model, **options)
     wishes = _Wishes(
-        between, box, lengths, straight, snug, inventory, max_parts, tuple(keep_out or ())
+        between, box, lengths, straight, also, snug, inventory, max_parts, tuple(keep_out or ())
     )
     filters = _filters(assembly, wishes)
     sequence = count is not None or target is not None

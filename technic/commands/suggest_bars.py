@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from technic.commands.progress import progress_bar
 from technic.errors import UsageError
@@ -72,8 +73,8 @@ def _taken(answers: list[BarSuggestions], wishes: BarWishes) -> list[BarSuggesti
     return every[: wishes.apply] if wishes.sequence else [every[wishes.apply - 1]]
 
 
-def suggest_for_linkage(model: Path, wishes: BarWishes) -> None:
-    """Say which bars help a linkage, and write what was asked for."""
+def suggest_for_linkage(model: Path, options: Mapping[str, Any], wishes: BarWishes) -> None:
+    """Say which bars help a linkage, and write what was asked for; `options` are the reader's."""
     from technic.design.bar_file import write_with_bars
     from technic.design.bar_search import suggest_bars
     from technic.design.reinforce import reinforce_bars
@@ -81,7 +82,7 @@ def suggest_for_linkage(model: Path, wishes: BarWishes) -> None:
     from technic.report.json import STDOUT, write_json
     from technic.report.suggest_bars import bars_dict, bars_text
 
-    assembly = load(model)
+    assembly = load(model, **options)
     rules = _rules(assembly, wishes)
     with progress_bar() as tell:
         if wishes.sequence:
