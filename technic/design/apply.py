@@ -60,13 +60,13 @@ def change_of(assembly: Assembly, candidate: Candidate, *, color: int = HIGHLIGH
     """Return the parts that a candidate adds and removes."""
     added = [NewPart(candidate.number, color, candidate.pose)]
     removed = []
-    turn = _pin_rotation(candidate.axis)
     for attachment in candidate.attachments:
         fastening = attachment.fastening
         if fastening.kind == "present":
             continue
         shift = fastening.center - float(np.dot(attachment.line_point, candidate.axis))
         place = np.asarray(attachment.line_point) + shift * candidate.axis
+        turn = _pin_rotation(fastening.sign * candidate.axis)
         added.append(NewPart(fastening.pin, color, Pose(turn, place)))
         if fastening.kind == "exchange":
             removed.append(assembly.parts[fastening.old_pin].id)

@@ -7,9 +7,10 @@ come out of the distances themselves); bent beams are laid by any two of their h
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import combinations
 from typing import Final
 
 import numpy as np
@@ -21,9 +22,19 @@ from technic.errors import UsageError
 from technic.geometry import Array, Pose, readonly
 from technic.parts.catalogue import catalogue
 from technic.parts.definition import PartDefinition, PortKind
-from technic.units import LDU, PITCH
+from technic.units import LDU
 
-__all__ = ["BENT", "STRAIGHT", "Attachment", "Candidate", "candidates", "describe_fit"]
+__all__ = [
+    "BENT",
+    "FRAMES",
+    "STRAIGHT",
+    "THIN",
+    "Attachment",
+    "Candidate",
+    "candidates",
+    "describe_fit",
+    "holes_of",
+]
 
 STRAIGHT: Final = {
     2: "43857", 3: "32523", 5: "32316", 7: "32524", 9: "40490", 11: "32525", 13: "41239", 15: "32278",
@@ -32,6 +43,15 @@ STRAIGHT: Final = {
 
 BENT: Final = ("32526", "32140", "32348", "32271", "6629")
 """Thick bent beams: two of 90 degrees and three of 53.13."""
+
+FRAMES: Final = ("64179", "64178", "39794", "39790", "67491")
+"""Frames: 5 x 7, 5 x 11, 7 x 11, 11 x 15, 3 x 19."""
+
+THIN: Final = {5: "32017", 6: "32063", 7: "32065"}
+"""Straight thin beams by their number of holes."""
+
+THIN_BENT: Final = ("2905", "99773")
+"""Thin triangles, by their pin holes."""
 
 EXACT: Final = 0.05e-3
 """Holes that miss each other by less than this (m) fit: it is half the play of a pin in its hole."""
@@ -75,6 +95,8 @@ class Candidate:
         Two or more, in the order of the holes.
     mismatch : float
         How far the worst hole misses its line (m).
+    face : int
+        Which holes it is pinned by; see `Face`.
     """
 
     number: str
@@ -82,11 +104,17 @@ class Candidate:
     axis: Array
     attachments: tuple[Attachment, ...]
     mismatch: float
+    face: int = 0
 
     @property
     def definition(self) -> PartDefinition:
         """The beam's definition."""
-        return _beam(self.number)[0]
+        return faces(self.number)[0].definition
+
+    @property
+    def frame(self) -> Array:
+        """From the axes of its face, where holes lie along y, to the world, (3, 3)."""
+        return np.asarray(self.pose.rotation @ faces(self.number)[self.face].turn.T)
 
     @property
     def parts(self) -> tuple[int, ...]:
@@ -111,21 +139,62 @@ def describe_fit(candidate: Candidate) -> str:
     return f"snug: holes miss by {candidate.mismatch * 1e3:.2f} mm"
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Face:
+    """Holes of a part that lie in one layer, by which it can be pinned. Beams have one, frames more.
+
+    Parameters
+    ----------
+    definition : PartDefinition
+    names : tuple of str
+        Of the holes.
+    turn : (3, 3) ndarray
+        From the part's axes to those of the face, in which holes lie along y.
+    points : (h, 3) ndarray
+        Middles of the holes in the axes of the face (m).
+    """
+
+    definition: PartDefinition
+    names: tuple[str, ...]
+    turn: Array
+    points: Array
+
+    @property
+    def plane(self) -> Array:
+        """Middles of the holes in the plane of the face, (h, 2)."""
+        return np.asarray(self.points[:, [2, 0]])
+
+
+_TURNS: Final = (
+    np.eye(3),
+    np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+    np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
+)
+"""Turns that bring y, x and z to y."""
+
+
 @lru_cache(maxsize=64)
-def _beam(number: str) -> tuple[PartDefinition, Array, Array]:
-    """Return a beam's definition, the places of its pin holes, and their frame (rows: axis, across)."""
+def faces(number: str) -> tuple[Face, ...]:
+    """Return the faces of a beam or a frame; those with holes along y come first."""
     definition = catalogue().get(number)
     if definition is None:
         raise UsageError(f"part {number} is not in the catalogue")
     holes = [p for p in definition.ports if p.kind is PortKind.PIN_HOLE]
-    points = np.array([p.position for p in holes])
-    return definition, readonly(points), readonly(holes[0].axis)
+    found = []
+    for turn in _TURNS:
+        along = [(p, turn @ p.position) for p in holes if abs(turn[1] @ p.axis) > 0.999]
+        for depth in sorted({round(float(point[1]) / LDU) for _, point in along}):
+            own = [(p, q) for p, q in along if round(float(q[1]) / LDU) == depth]
+            if len(own) > 1:
+                names = tuple(p.name for p, _ in own)
+                points = readonly(np.array([q for _, q in own]))
+                found.append(Face(definition, names, readonly(turn), points))
+    return tuple(found)
 
 
-@lru_cache(maxsize=64)
-def holes_of(number: str) -> tuple[str, ...]:
-    """Return the names of a beam's pin holes, in order."""
-    return tuple(p.name for p in _beam(number)[0].ports if p.kind is PortKind.PIN_HOLE)
+def holes_of(number: str, face: int = 0) -> tuple[str, ...]:
+    """Return the names of the pin holes of a face, in order."""
+    return faces(number)[face].names
 
 
 def candidates(
@@ -133,6 +202,8 @@ def candidates(
     *,
     lengths: Sequence[int] | None = None,
     bent: bool = True,
+    thin: bool = False,
+    frames: bool = False,
     snug: float = 0.0,
     exclude: frozenset[int] = frozenset(),
     stock: frozenset[str] | None = None,
@@ -146,6 +217,8 @@ def candidates(
         Lengths of straight beams; default all.
     bent : bool
         Offer bent beams too.
+    thin, frames : bool
+        Offer thin beams, frames too.
     snug : float
         Largest mismatch of holes (m); at most `EXACT` when 0.
     exclude : frozenset of int
@@ -153,75 +226,119 @@ def candidates(
     stock : frozenset of str, optional
         Only these beams; a longer one may then stand in for one that is missing.
     """
-    lengths = sorted(lengths or STRAIGHT)
-    unknown = [n for n in lengths if n not in STRAIGHT]
+    unknown = [n for n in lengths or () if n not in STRAIGHT and not (thin and n in THIN)]
     if unknown:
         raise UsageError(
             f"there is no straight beam with {unknown[0]} holes; there are "
             + ", ".join(map(str, STRAIGHT))
         )
-    curved: tuple[str, ...] = BENT if bent else ()
-    if stock is not None:
-        lengths = [n for n in lengths if STRAIGHT[n] in stock]
-        curved = tuple(number for number in curved if number in stock)
+    thick = _choices(STRAIGHT, BENT if bent else (), lengths, stock)
+    flat = _choices(THIN, THIN_BENT if bent else (), lengths, stock) if thin else []
+    if frames:
+        thick += [
+            _Choice(number, face, _every_pair(len(each.names)), straight=False)
+            for number in FRAMES
+            if stock is None or number in stock
+            for face, each in enumerate(faces(number))
+        ]
+    tolerance = max(snug, EXACT)
     found: list[Candidate] = []
-    for bundle in bundles(assembly, exclude=exclude):
-        for layer in _layers(bundle):
-            found += _layer_candidates(bundle, layer, lengths, curved, max(snug, EXACT))
+    for bundle in bundles(assembly, exclude=exclude, thin=thin):
+        for layer in _layers(bundle.sites):
+            found += _layer_candidates(bundle, layer, thick, tolerance)
+        for layer in _layers(bundle.thin):
+            found += _layer_candidates(bundle, layer, flat, tolerance)
     return found
 
 
-def _layers(bundle: Bundle) -> Iterator[list[int]]:
-    order = sorted(range(len(bundle.sites)), key=lambda k: bundle.sites[k].t)
-    layer: list[int] = []
-    for k in order:
-        if layer and bundle.sites[k].t - bundle.sites[layer[0]].t > _LAYER:
+@dataclass(frozen=True, slots=True)
+class _Choice:
+    """A face of a part, and the pairs of its holes by which it is laid."""
+
+    number: str
+    face: int
+    pairs: list[tuple[int, int]]
+    straight: bool
+
+
+def _choices(
+    straight: Mapping[int, str],
+    bent: Sequence[str],
+    lengths: Sequence[int] | None,
+    stock: frozenset[str] | None,
+) -> list[_Choice]:
+    """Return straight beams, each by the pairs that no shorter one reaches, then bent ones."""
+    out = []
+    shorter = 1
+    for length in sorted(straight):
+        number = straight[length]
+        if (lengths and length not in lengths) or (stock is not None and number not in stock):
+            continue
+        out.append(_Choice(number, 0, along_line(length, shorter), straight=True))
+        shorter = length
+    for number in bent:
+        if stock is None or number in stock:
+            out.append(_Choice(number, 0, across_arms(faces(number)[0].plane), straight=False))
+    return out
+
+
+def _every_pair(count: int) -> list[tuple[int, int]]:
+    return list(combinations(range(count), 2))
+
+
+def _layers(sites: Sequence[Site]) -> Iterator[list[Site]]:
+    layer: list[Site] = []
+    for site in sorted(sites, key=lambda site: site.t):
+        if layer and site.t - layer[0].t > _LAYER:
             yield layer
             layer = []
-        layer.append(k)
+        layer.append(site)
     if layer:
         yield layer
 
 
 def _layer_candidates(
-    bundle: Bundle,
-    layer: list[int],
-    lengths: Sequence[int],
-    bent: Sequence[str],
-    tolerance: float,
+    bundle: Bundle, sites: list[Site], choices: Sequence[_Choice], tolerance: float
 ) -> Iterator[Candidate]:
     from scipy.spatial import cKDTree
+    from scipy.spatial.distance import pdist
 
-    if len(layer) < 2:
+    if len(sites) < 2 or not choices:
         return
-    sites = [bundle.sites[k] for k in layer]
     flat = np.array([bundle.lines[s.line].uv for s in sites])
     tree = cKDTree(flat)
-    near = tree.query_pairs((max(STRAIGHT) - 1) * PITCH + tolerance, output_type="ndarray")
+    reach = max(float(pdist(faces(c.number)[c.face].plane).max()) for c in choices)
+    near = tree.query_pairs(reach + 2.0 * tolerance, output_type="ndarray")
     held = [frozenset(s.fastening.parts) for s in sites]
     pairs = np.array(
         [(i, j) for i, j in near.tolist() if _ties(held[i], held[j])], dtype=np.intp
     ).reshape(-1, 2)
     if not len(pairs):
         return
-    shorter = 1
-    beams: list[tuple[str, list[tuple[int, int]], bool]] = []
-    for length in lengths:
-        beams.append((STRAIGHT[length], along_line(length, shorter), True))
-        shorter = length
-    beams += [(number, across_arms(_beam(number)[1][:, [2, 0]]), False) for number in bent]
-    for number, wanted, straight in beams:
-        plane = _beam(number)[1][:, [2, 0]]
-        placed = place(plane, wanted, flat, pairs, tolerance, straight=straight)
+    for choice in choices:
+        plane = faces(choice.number)[choice.face].plane
+        placed = place(plane, choice.pairs, flat, pairs, tolerance, straight=choice.straight)
         if not len(placed.turns):
             continue
         distance, nearest = tree.query(placed.holes, distance_upper_bound=tolerance)
+        seen: set[bytes] = set()
         for k in range(len(placed.turns)):
+            if choice.number in FRAMES and _seen(placed.holes[k], seen):
+                continue
             holes = np.flatnonzero(np.isfinite(distance[k])).tolist()
             hits = [(hole, int(nearest[k, hole])) for hole in holes]
-            made = _candidate(bundle, sites, number, placed, k, hits)
+            made = _candidate(bundle, sites, choice, placed, k, hits)
             if made is not None:
                 yield made
+
+
+def _seen(holes: Array, seen: set[bytes]) -> bool:
+    """Return whether a part with these holes has been here: frames turned by half are the same."""
+    places = np.unique(np.round(holes / (LDU / 4)).astype(np.int64), axis=0).tobytes()
+    if places in seen:
+        return True
+    seen.add(places)
+    return False
 
 
 def _ties(first: frozenset[int], second: frozenset[int]) -> bool:
@@ -232,7 +349,7 @@ def _ties(first: frozenset[int], second: frozenset[int]) -> bool:
 def _candidate(
     bundle: Bundle,
     sites: Sequence[Site],
-    number: str,
+    choice: _Choice,
     placed: Placed,
     index: int,
     hits: list[tuple[int, int]],
@@ -254,9 +371,10 @@ def _candidate(
     normal = -n if placed.turned_over[index] else n
     # part axes in the world: holes along y, the beam along z; x = y x z
     across = (cosine * v - sine * u) * (-1.0 if placed.turned_over[index] else 1.0)
-    rotation = np.column_stack([across, normal, along]) + 0.0
+    face = faces(choice.number)[choice.face]
+    rotation = np.column_stack([across, normal, along]) @ face.turn + 0.0
     x, y = placed.origins[index]
-    origin = x * u + y * v + t * n - _beam(number)[1][0, 1] * normal
+    origin = x * u + y * v + t * n - face.points[0, 1] * normal
     worst = 0.0
     attachments = []
     for hole, site in kept:
@@ -266,7 +384,8 @@ def _candidate(
         across_line = (where - own) - ((where - own) @ n) * n
         worst = max(worst, float(np.sqrt(across_line @ across_line)))
         attachments.append(Attachment(hole, _triple(where), _triple(own), site.fastening))
-    return Candidate(number, Pose(rotation, origin), n, tuple(attachments), worst)
+    pose = Pose(rotation, origin)
+    return Candidate(choice.number, pose, n, tuple(attachments), worst, choice.face)
 
 
 def _triple(point: Array) -> tuple[float, float, float]:

@@ -176,7 +176,13 @@ def _meet(a: Any, b: Any) -> bool:
 
 
 def push_side(
-    surroundings: Surroundings, point: Array, axis: Array, length: float, ignore: Iterable[int]
+    surroundings: Surroundings,
+    point: Array,
+    axis: Array,
+    length: float,
+    ignore: Iterable[int],
+    *,
+    ways: Sequence[int] = (1, -1),
 ) -> int:
     """Return the side (+1 or -1 along `axis`) from which a pin can be pushed in, 0 when from neither.
 
@@ -190,10 +196,12 @@ def push_side(
         Of the pin (m). As much room is needed outside.
     ignore : iterable of int
         Parts that are not in the way, e.g. the pin that it replaces.
+    ways : sequence of int
+        Sides to try, in this order.
     """
     skip = set(ignore)
     gap = 1.0 * LDU
-    for side in (1, -1):
+    for side in ways:
         start = point + side * (length / 2 + gap) * axis
         if not surroundings.blocks(start, start + side * (length - gap) * axis, skip):
             return side

@@ -2,7 +2,7 @@
 
 The beam and the new pins have unknowns of their own; statically they follow from the movement of the
 holes and pins that hold them. What is left is a stiffness and an inertia felt at those places. All
-twists here are in the beam's own axes; its holes lie along y.
+twists here are in the axes of the beam's face; its holes lie along y.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import numpy as np
 from scipy import linalg
 
 from technic.design.apply import HIGHLIGHT, new_part
-from technic.design.candidates import Attachment, Candidate, holes_of
+from technic.design.candidates import Attachment, Candidate, faces, holes_of
 from technic.errors import UsageError
 from technic.fem.element import Element
-from technic.geometry import Array, Pose, readonly, shift_twist
+from technic.geometry import Array, Pose, readonly, shift_twist, turn_twist
 from technic.ldraw.write import NewPart
 from technic.parts.catalogue import catalogue
 from technic.parts.definition import PartDefinition
@@ -65,7 +65,7 @@ class Condensed:
 def hold_of(candidate: Candidate, attachment: Attachment, old: PartDefinition | None) -> Hold:
     """Return how a hole of a candidate is held; `old` is the pin that is exchanged, if one is."""
     fastening = attachment.fastening
-    flip = float(np.sign(candidate.pose.rotation[:, 1] @ candidate.axis))
+    flip = float(np.sign(candidate.frame[:, 1] @ candidate.axis))
     along = float(np.dot(attachment.line_point, candidate.axis))
 
     def local(t: float) -> float:
@@ -83,12 +83,15 @@ def hold_of(candidate: Candidate, attachment: Attachment, old: PartDefinition | 
 
 
 @lru_cache(maxsize=1024)
-def _element(number: str, holes: tuple[int, ...], parts: PartModel) -> Element:
-    """Return a beam's element with a frame for each of some of its pin holes."""
+def _element(
+    number: str, face: int, holes: tuple[int, ...], parts: PartModel
+) -> tuple[Element, Array]:
+    """Return a beam's element, and the frames of some of its pin holes in the axes of a face."""
     beam = new_part(NewPart(number, HIGHLIGHT, Pose(np.eye(3), np.zeros(3))), 1, 1)
-    names = tuple(holes_of(number)[hole] for hole in holes)
+    names = tuple(holes_of(number, face)[hole] for hole in holes)
     points = np.array([_definition(number).port(name).position for name in names])
-    return FACTORIES[parts](beam, points, names)
+    element = FACTORIES[parts](beam, points, names)
+    return element, readonly(turn_twist(faces(number)[face].turn) @ element.frames)
 
 
 def _definition(number: str) -> PartDefinition:
@@ -146,7 +149,7 @@ class _Matrices:
 
 @lru_cache(maxsize=4096)
 def condensed(
-    number: str, holds: tuple[Hold, ...], pin: tuple[float, ...], parts: PartModel
+    number: str, face: int, holds: tuple[Hold, ...], pin: tuple[float, ...], parts: PartModel
 ) -> Condensed:
     """Return a beam and its new pins, condensed.
 
@@ -154,6 +157,8 @@ def condensed(
     ----------
     number : str
         Of the beam.
+    face : int
+        By which of its faces it is pinned.
     holds : tuple of Hold
     pin : tuple of float
         Stiffness of a pin in a hole [axial, shear, shear, spin, tilt, tilt].
@@ -166,7 +171,7 @@ def condensed(
         Places in the order of `holds`: each hole that a new pin enters, or the hole of the beam for
         the movement of a pin that is there already.
     """
-    m = _matrices(number, holds, pin, parts)
+    m = _matrices(number, face, holds, pin, parts)
     follow = -linalg.solve(m.own, m.cross, assume_a="pos")
     stiffness = m.outer + m.cross.T @ follow
     inertia = m.heavy + follow.T @ m.inertia @ follow
@@ -174,9 +179,9 @@ def condensed(
 
 
 def _matrices(
-    number: str, holds: tuple[Hold, ...], pin: tuple[float, ...], parts: PartModel
+    number: str, face: int, holds: tuple[Hold, ...], pin: tuple[float, ...], parts: PartModel
 ) -> _Matrices:
-    element = _element(number, tuple(hold.hole for hold in holds), parts)
+    element, frames = _element(number, face, tuple(hold.hole for hold in holds), parts)
     n = element.stiffness.shape[0]
     new_pins = sum(bool(hold.bores) for hold in holds)
     places = sum(max(1, len(hold.bores)) for hold in holds)
@@ -188,7 +193,7 @@ def _matrices(
     heavy = np.zeros((6 * places, 6 * places))
     mass = _definition(number).mass_properties.mass
     place, body = 0, n
-    for hold, frame in zip(holds, element.frames, strict=True):
+    for hold, frame in zip(holds, frames, strict=True):
         if not hold.bores:
             here = slice(6 * place, 6 * place + 6)
             spring = _spring(pin)

@@ -30,6 +30,8 @@ class Filters:
         Lengths of straight beams.
     bent : bool
         Offer bent beams.
+    thin, frames : bool
+        Offer thin beams, frames.
     snug : float
         Largest mismatch of holes (m).
     inventory : mapping of str to int or None
@@ -45,6 +47,8 @@ class Filters:
     box: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
     lengths: tuple[int, ...] | None = None
     bent: bool = True
+    thin: bool = False
+    frames: bool = False
     snug: float = 0.0
     inventory: Mapping[str, int] | None = None
     max_parts: int | None = None

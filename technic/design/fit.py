@@ -10,6 +10,7 @@ from technic.assembly.model import Assembly
 from technic.design.apply import Change
 from technic.design.candidates import Candidate
 from technic.design.collide import Surroundings, pin_length, push_side, solid_overlaps
+from technic.design.sites import SHORT_PIN
 from technic.errors import UsageError
 from technic.geometry import Array
 from technic.parts.catalogue import catalogue
@@ -54,7 +55,11 @@ def fit(surroundings: Surroundings, candidate: Candidate, change: Change) -> Fit
         if surroundings.hits(definition, pin.pose, {*fastening.parts, *old}):
             return Fit("a part is in the way of a pin")
         middle = pin.pose.translation
-        side = push_side(surroundings, middle, candidate.axis, pin_length(pin.number), old)
+        # a pin with unlike ends has its collar between them: it goes in from its short end's side
+        ways = (fastening.sign,) if pin.number == SHORT_PIN else (1, -1)
+        side = push_side(
+            surroundings, middle, candidate.axis, pin_length(pin.number), old, ways=ways
+        )
         if side == 0:
             return Fit("a pin cannot be pushed in from either side")
         sides.append(_side(side * candidate.axis))

@@ -188,7 +188,7 @@ class Screen:
             for a in candidate.attachments
             if a.fastening.old_pin >= 0 and a.fastening.parts
         }  # a motion does not say how pins turn in place: take the part that the pin is in
-        turn = turn_twist(candidate.pose.rotation.T)
+        turn = turn_twist(candidate.frame.T)
         moves = []
         for (part, place), arm in self._layout(candidate):
             owner = holders.get(part, part)
@@ -198,7 +198,8 @@ class Screen:
         return float(field @ self._condensed(candidate).stiffness @ field) / 2.0
 
     def _condensed(self, candidate: Candidate) -> Condensed:
-        return condensed(candidate.number, self._holds(candidate), self._pin, self._parts)
+        holds = self._holds(candidate)
+        return condensed(candidate.number, candidate.face, holds, self._pin, self._parts)
 
     def _holds(self, candidate: Candidate) -> tuple[Hold, ...]:
         holds: list[Hold] = []
@@ -216,7 +217,7 @@ class Screen:
     @staticmethod
     def _turned(candidate: Candidate, places: list[tuple[Key, Array]], twists: Array) -> Array:
         """Return the movement at every place in the beam's axes, six rows each."""
-        turn = turn_twist(candidate.pose.rotation.T)
+        turn = turn_twist(candidate.frame.T)
         arms = np.array([arm for _, arm in places])
         if arms.any():
             twists = shift_twist(arms) @ twists

@@ -22,7 +22,7 @@ from technic.ldraw.placed import PlacedPorts, collect
 from technic.parts.definition import PortKind
 from technic.units import LDU, PITCH
 
-__all__ = ["LONGER", "NEW", "Bundle", "Fastening", "Line", "Site", "bundles"]
+__all__ = ["LONGER", "NEW", "SHORT_PIN", "Bundle", "Fastening", "Line", "Site", "bundles"]
 
 LONGER: Final = {"pin-friction": "6558", "pin-frictionless": "32556a"}
 """The 3L pin that takes the place of a 2L pin of a family."""
@@ -32,6 +32,9 @@ NEW: Final = "new step"
 
 NEW_PIN: Final = "2780"
 """The pin put into a free hole."""
+
+SHORT_PIN: Final = "32002"
+"""The pin with one end half as long, for thin beams."""
 
 _SAME_LINE: Final = 0.5 * LDU
 """Holes whose axes are this close share a line: a pin goes through both (its play is about 0.25 LDU
@@ -67,6 +70,9 @@ class Fastening:
         The present pin that is exchanged or used; -1 for a new pin.
     parts : tuple of int
         Parts of structure that the beam is tied to.
+    sign : int
+        Along the line (1) or against it (-1): where the pin's own x points, which matters for pins
+        with unlike ends.
     """
 
     kind: str
@@ -75,6 +81,7 @@ class Fastening:
     bores: tuple[tuple[int, float], ...]
     old_pin: int
     parts: tuple[int, ...]
+    sign: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,12 +121,14 @@ class Bundle:
     axes : (3, 3) ndarray
         Rows: direction of the lines, then the two directions of the plane across them.
     lines : tuple of Line
-    sites : tuple of Site
+    sites, thin : tuple of Site
+        For holes of thick and of thin beams.
     """
 
     axes: Array
     lines: tuple[Line, ...]
     sites: tuple[Site, ...]
+    thin: tuple[Site, ...] = ()
 
     def point(self, line: int, t: float) -> Array:
         """Return a place on a line in the world (m)."""
@@ -127,7 +136,9 @@ class Bundle:
         return np.asarray(t * self.axes[0] + u * self.axes[1] + v * self.axes[2])
 
 
-def bundles(assembly: Assembly, *, exclude: frozenset[int] = frozenset()) -> tuple[Bundle, ...]:
+def bundles(
+    assembly: Assembly, *, exclude: frozenset[int] = frozenset(), thin: bool = False
+) -> tuple[Bundle, ...]:
     """Return all places where a hole of a new beam can be fastened.
 
     Parameters
@@ -135,6 +146,8 @@ def bundles(assembly: Assembly, *, exclude: frozenset[int] = frozenset()) -> tup
     assembly : Assembly
     exclude : frozenset of int
         Parts that nothing may be tied to.
+    thin : bool
+        Find places for thin beams as well.
     """
     placed = collect(assembly.parts)
     bores = placed.of_kind(PortKind.PIN_HOLE)
@@ -150,7 +163,12 @@ def bundles(assembly: Assembly, *, exclude: frozenset[int] = frozenset()) -> tup
             for k, line in enumerate(lines)
             for t, fastening in _sites(assembly.parts, line, shared, exclude)
         )
-        found.append(Bundle(axes, lines, sites))
+        flat = tuple(
+            Site(k, t, fastening)
+            for k, line in enumerate(lines)
+            for t, fastening in (_thin_sites(line, exclude) if thin else ())
+        )
+        found.append(Bundle(axes, lines, sites, flat))
     return tuple(found)
 
 
@@ -256,6 +274,28 @@ def _sites(
         fastening = _fasten(parts, line, t, shared, exclude)
         if fastening is not None and not exclude.intersection(fastening.parts):
             out.append((t, fastening))
+    return out
+
+
+def _thin_sites(line: Line, exclude: frozenset[int]) -> list[tuple[float, Fastening]]:
+    """Return the places on a line for a hole of a thin beam: half a pitch of room beside an empty hole,
+    for a pin with one short end.
+    """
+    out = []
+    for t, length, part in line.bores:
+        if length < _FULL or part in exclude:
+            continue
+        if any(abs(s - t) < half + length / 2 - _ON_GRID for s, half, _, _ in line.shafts):
+            continue
+        for side in (-1, 1):
+            face = t + side * length / 2
+            place = face + side * PITCH / 4
+            if any(abs(place - b) < PITCH / 4 + n / 2 - _ON_GRID for b, n, _ in line.bores):
+                continue
+            if any(abs(place - s) < PITCH / 4 + n - _ON_GRID for s, n, _, _ in line.shafts):
+                continue
+            fastening = Fastening("pin", SHORT_PIN, face, ((part, t),), -1, (part,), side)
+            out.append((place, fastening))
     return out
 
 

@@ -191,6 +191,8 @@ def _candidates(assembly: Assembly, filters: Filters) -> list[Candidate]:
         assembly,
         lengths=filters.lengths,
         bent=filters.bent,
+        thin=filters.thin,
+        frames=filters.frames,
         snug=filters.snug,
         exclude=filters.keep_out,
         stock=None if filters.inventory is None else _stock(filters),
