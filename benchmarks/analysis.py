@@ -6,6 +6,7 @@
 - the demo from file to JSON as a whole process, beside an empty interpreter;
 - the eigen step beside dense ``scipy.linalg.eigh`` for 12 pairs on the same matrices (about 8,000
   unknowns; about 1,500 with --quick);
+- the solid model of a part, read from the shipped file, over 40 parts;
 - the catalogue from nothing, in a fresh process, beside an empty interpreter.
 
 Medians of several runs; times depend on the machine, ratios less so.
@@ -21,7 +22,7 @@ from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 from scipy import linalg, sparse
@@ -106,6 +107,21 @@ def eigen_seconds(unknowns: int) -> dict[str, float]:
     }
 
 
+def solid_model_seconds(parts: int = 40) -> float:
+    """Return the processor time that reading a part's solid model takes, the first one's included."""
+    from technic.fem.solid.store import load as read_model
+    from technic.fem.solid.store import stored
+    from technic.parts.catalogue import catalogue
+
+    chosen = [catalogue().get(number) for number in stored()[:parts]]
+    start = process_time()
+    found = [read_model(part) for part in chosen if part is not None]
+    seconds = process_time() - start
+    if None in found:
+        raise SystemExit("a shipped solid model is out of date")
+    return seconds / len(found)
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -122,6 +138,7 @@ def main() -> None:
     loaded = process_seconds(["-c", code])
     bare = process_seconds(["-c", "import technic.parts.definition"])
     figures["catalogue_s"] = loaded - bare
+    figures["solid_model_s"] = solid_model_seconds()
     figures["eigen"] = eigen_seconds(1500 if options.quick else 8000)
     text = json.dumps(figures, indent=2)
     print(text)
