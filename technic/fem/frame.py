@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from technic.errors import InputError
 from technic.fem.element import Element
-from technic.geometry import Array, shift_twist, turn_twist
+from technic.geometry import Array, cross, shift_twist, turn_twist
 from technic.parts.definition import FrameBody, MassProperties, Material, Section
 
 __all__ = ["frame_element", "local_mass", "local_stiffness", "member_matrices", "subdivide"]
@@ -74,12 +74,9 @@ def frame_element(body: FrameBody, properties: MassProperties, attachments: Arra
     unscaled = float(rigid[:, 0] @ mass @ rigid[:, 0])
     mass *= properties.mass / unscaled
     _complete_inertia(mass, rigid, properties)
-    frames = np.zeros((len(attachments), 6, 6 * n))
-    for row, node in enumerate(node_of):
-        frames[row, :, 6 * node : 6 * node + 6] = np.eye(6)
-    nodes = np.zeros((n, 3, 6 * n))
-    for node in range(n):
-        nodes[node, :, 6 * node : 6 * node + 3] = np.eye(3)
+    unit = np.eye(6 * n).reshape(n, 6, 6 * n)
+    frames = unit[np.array(node_of, dtype=np.int64)]
+    nodes = unit[:, :3].copy()
     return Element(
         stiffness=stiffness,
         mass=mass,
@@ -101,9 +98,8 @@ def _complete_inertia(mass: Array, rigid: Array, properties: MassProperties) -> 
     moments, axes = np.linalg.eigh(properties.inertia - present)
     missing = (axes * np.clip(moments, 0.0, None)) @ axes.T
     nodes = len(mass) // 6
-    for node in range(nodes):
-        own = slice(6 * node + 3, 6 * node + 6)
-        mass[own, own] += missing / nodes
+    own = np.arange(nodes)
+    mass.reshape(nodes, 6, nodes, 6)[own, 3:, own, 3:] += missing / nodes
 
 
 def subdivide(
@@ -207,7 +203,7 @@ def member_matrices(
     if size < 1e-9 * float(np.linalg.norm(normal)):
         raise InputError("the normal of a frame member is parallel to the member")
     z = z / size
-    turn = np.kron(np.eye(2), turn_twist(np.array([x, np.cross(z, x), z])))
+    turn = np.kron(np.eye(2), turn_twist(np.array([x, cross(z, x), z])))
     k = local_stiffness(lengths, section, material)
     m = local_mass(lengths, section, material)
     return turn.T @ k @ turn, turn.T @ m @ turn

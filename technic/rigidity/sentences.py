@@ -30,7 +30,8 @@ def part_label(part: Part) -> str:
 
 def motion_sentence(assembly: Assembly, motion: Motion) -> str:
     """Say which parts move, how, and about what."""
-    groups = _groups(assembly, motion)
+    alone = len(motion.parts) == 1
+    groups = [(list(motion.parts), motion.twists)] if alone else _groups(assembly, motion)
     said = [
         f"{_who(assembly, parts)} {_how(assembly, motion, parts, twists)}"
         for parts, twists in groups[:GROUPS_SHOWN]
@@ -128,6 +129,8 @@ def _axis_part(
     best: tuple[bool, int] | None = None
     for k in motion.freed_by:
         joint = assembly.joints[k]
+        if not any(assembly.parts[p].fastener for p in joint.parts):
+            continue
         arm = joint.point - point
         if np.linalg.norm(arm - (arm @ direction) * direction) > 4 * SAME_LINE:
             continue

@@ -140,14 +140,13 @@ def cluster_field(
 
     About its reference point, or about the centroid of its first part (`at_part`).
     """
-    place = {p: k for k, p in enumerate(motions.parts)}
-    rows = motions.twists.tocsr()
-    out = np.zeros((len(clusters), 6, motions.twists.shape[1]))
-    for n, cluster in enumerate(clusters):
-        p = cluster.parts[0]
-        arm = (0.0 if at_part else 1.0) * (cluster.reference - kin.origins[p]) / kin.length
-        out[n] = shift_twist(arm) @ rows[6 * place[p] : 6 * place[p] + 6].toarray()
-    return out
+    first = np.array([cluster.parts[0] for cluster in clusters])
+    rows = 6 * np.searchsorted(motions.parts, first)[:, None] + np.arange(6)
+    field = motions.twists.tocsr()[rows.ravel()].toarray().reshape(len(clusters), 6, -1)
+    if at_part:
+        return np.asarray(field)
+    references = np.array([cluster.reference for cluster in clusters])
+    return np.asarray(shift_twist((references - kin.origins[first]) / kin.length) @ field)
 
 
 def sparse_basis(space: Array, bodies: int, simple: Array | None = None) -> list[Array]:
