@@ -14,6 +14,7 @@ __all__ = ["PICTURES", "write_template"]
 _FILES = (
     ("template", "readings.csv"),
     ("template", "readings.schema.json"),
+    ("template", "datapackage.json"),
     ("template", "protocol.md"),
     ("rigs", "rigs.toml"),
 )

@@ -203,6 +203,32 @@ def test_schema_beside_the_template_has_the_same_columns():
     assert header == ",".join(COLUMNS)
 
 
+def test_samples_obey_the_schema():
+    # a reading of the Table Schema standard by itself: frictionless is no dependency
+    folder = calibration.files()
+    package = json.loads(folder.joinpath("template", "datapackage.json").read_text("utf-8"))
+    (resource,) = package["resources"]
+    assert (resource["path"], resource["schema"]) == ("readings.csv", "readings.schema.json")
+    assert resource["dialect"] == {"commentChar": "#"}
+    schema = json.loads(folder.joinpath("template", resource["schema"]).read_text("utf-8"))
+    kinds = {"string": str, "number": float, "integer": int}
+    files = [folder.joinpath("template", "readings.csv")]
+    files += [f for f in folder.joinpath("samples").iterdir() if f.name.endswith(".csv")]
+    assert len(files) >= 7
+    for file in files:
+        lines = [x for x in file.read_text("utf-8").splitlines() if not x.startswith("#")]
+        assert lines[0].split(",") == [field["name"] for field in schema["fields"]]
+        for line in lines[1:]:
+            for field, cell in zip(schema["fields"], line.split(","), strict=True):
+                rules = field.get("constraints", {})
+                if cell in schema["missingValues"]:
+                    assert not rules.get("required"), (file.name, line, field["name"])
+                    continue
+                value = kinds[field["type"]](cell)
+                assert cell in rules.get("enum", [cell])
+                assert value >= rules.get("minimum", value)
+
+
 def test_own_rigs(tmp_path):
     (tmp_path / "r.ldr").write_text("0 rig\n")
     text = """schema = "technic-rigs/1"

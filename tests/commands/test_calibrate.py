@@ -181,6 +181,7 @@ def test_template_can_be_built_filled_and_calibrated(run, tmp_path):
     assert {
         "readings.csv",
         "readings.schema.json",
+        "datapackage.json",
         "protocol.md",
         "rigs.toml",
         "pin-pair.ldr",
