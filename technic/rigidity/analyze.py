@@ -9,6 +9,7 @@ from time import perf_counter
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from technic.assembly.model import Assembly, FindingKind
@@ -206,24 +207,38 @@ def _proof(kin: Kinematics, motions: ComponentMotions, component: int) -> str:
 def _pencil(system: System, kin: Kinematics, motions: ComponentMotions, measure: Measure) -> Pencil:
     """Return the eigenproblem of one component."""
     parts = list(motions.parts)
-    own = np.concatenate([np.arange(system.offsets[p], system.offsets[p + 1]) for p in parts])
-    member = np.isin(kin.component_of, kin.component_of[parts[0]])
-    rows = np.array([member[kin.owners[k][0]] for k in system.rows.link], dtype=bool)
+    component = kin.component_of[parts[0]]
+    if len(kin.components) == 1:
+        own, columns = np.arange(system.size), np.arange(6 * len(parts))
+    else:
+        own = np.concatenate([np.arange(system.offsets[p], system.offsets[p + 1]) for p in parts])
+        columns = (6 * np.array(parts)[:, None] + np.arange(6)).ravel()
+    rows = kin.link_component[system.rows.link] == component
     elastic = rows & system.elastic
-    a = sparse.csr_array(system.A[elastic][:, own])
+    a = _part_of(system.A, np.flatnonzero(elastic), own)
     joints = a.T @ sparse.diags_array(system.rows.stiffness[elastic]) @ a
     mass = sum(system.assembly.parts[p].mass_properties.mass for p in parts)
-    full = system.mass_matrix / mass if measure == "mean_square" else system.nodal()
-    rigid = system.R[own][:, np.concatenate([np.arange(6 * p, 6 * p + 6) for p in parts])]
+    full = system.mass_matrix if measure == "mean_square" else system.nodal()
     scale = sparse.diags_array(np.tile(kin.units, len(parts)))
     return Pencil(
         own=own,
-        stiffness=sparse.csr_array(system.K[own][:, own] + joints),
-        measure=sparse.csr_array(full[own][:, own]),
-        constraints=sparse.csr_array(system.A[rows & ~system.elastic][:, own]),
-        motions=sparse.csc_array(rigid @ (scale @ motions.twists)),
+        stiffness=sparse.csr_array(_part_of(system.K, own, own) + joints),
+        measure=_part_of(full, own, own) / (mass if measure == "mean_square" else 1.0),
+        constraints=_part_of(system.A, np.flatnonzero(rows & ~system.elastic), own),
+        motions=sparse.csc_array(_part_of(system.R, own, columns) @ (scale @ motions.twists)),
         mass=float(mass),
     )
+
+
+def _part_of(
+    matrix: sparse.csr_array, rows: NDArray[np.int64], columns: NDArray[np.int64]
+) -> sparse.csr_array:
+    """Return some rows and columns, both ascending; the matrix itself when they are all."""
+    if len(rows) < matrix.shape[0]:
+        matrix = matrix[rows]
+    if len(columns) < matrix.shape[1]:
+        matrix = matrix[:, columns]
+    return sparse.csr_array(matrix)
 
 
 def _elastic(

@@ -92,12 +92,16 @@ class Kinematics:
         return frozenset(k for k, joint in enumerate(joints) if joint.type is JointType.MESH)
 
     @cached_property
+    def link_component(self) -> NDArray[np.int64]:
+        """Component of every joint and support."""
+        return self.component_of[np.array([owner[0] for owner in self.owners], dtype=np.int64)]
+
+    @cached_property
     def _links(self) -> tuple[tuple[int, ...], ...]:
         """Joints and supports of every component."""
         out: list[list[int]] = [[] for _ in self.components]
-        own = self.component_of.tolist()
-        for k, owner in enumerate(self.owners):
-            out[own[owner[0]]].append(k)
+        for k, component in enumerate(self.link_component.tolist()):
+            out[component].append(k)
         return tuple(tuple(links) for links in out)
 
     def links_of(self, component: int, *, meshes: bool = True) -> list[int]:
