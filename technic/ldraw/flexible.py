@@ -11,7 +11,7 @@ from typing import Final
 
 from technic.ldraw.syntax import Line, Meta
 
-__all__ = ["SEGMENTS", "FlexibleState", "content_kind", "segment_kind"]
+__all__ = ["SEGMENTS", "WHOLE", "FlexibleState", "content_kind", "segment_kind"]
 
 SEGMENTS: Final[dict[str, str]] = {
     # Titles of the files in the LDraw parts library (2026-02).
@@ -56,6 +56,19 @@ SEGMENTS: Final[dict[str, str]] = {
 }
 """Part numbers that are one segment or link of something flexible, and of what."""
 
+WHOLE: Final[dict[str, str]] = {
+    "hose": "22296 22461 22463 42688 46305 53475 57274 60778 70688 70978 71175 71177 71192 71194 71505 "
+    "71551 71582 76250 76252 76254 76260 76263 76270 76276 76277 76279 76280 76281 76282 76283 76289 "
+    "76307 76324 76348 76389 80623",
+    "ribbed hose": "22678 22900 23397 33763 43675 57718 57719 71819 71917 71923 71944 71945 71946 71947 "
+    "71949 71951 71952 71986 72039 72504 72706 72853",
+    "cable": "342c01",
+    "tread": "486-f1 498 71372-f1 71735c01 4107488",
+}
+"""Part numbers that are a whole flexible thing, drawn straight or in one shape (titles of the library)."""
+
+_KINDS: Final = SEGMENTS | {number: kind for kind, row in WHOLE.items() for number in row.split()}
+
 _CONSTRAINT: Final = re.compile(r"ls\d\d")
 """Constraint markers of LSynth: points that a hose runs through, no parts."""
 
@@ -63,7 +76,7 @@ _CONTENT: Final = re.compile(r"\[\s*type\s*=\s*(path|spring)\w*\s*\]", re.IGNORE
 
 
 def segment_kind(number: str) -> str | None:
-    """Return what the part is a segment of, or None.
+    """Return what flexible thing the part is, or is a segment of; None when it is a body.
 
     Parameters
     ----------
@@ -72,7 +85,7 @@ def segment_kind(number: str) -> str | None:
     """
     if _CONSTRAINT.fullmatch(number):
         return "LSynth hose"
-    return SEGMENTS.get(number)
+    return _KINDS.get(number)
 
 
 def content_kind(lines: tuple[Line, ...]) -> str | None:

@@ -15,6 +15,7 @@ from technic.assembly.overrides import apply_overrides, by_user
 from technic.assembly.stiffness import default_table
 from technic.ldraw.connect import Links, findings_of, link
 from technic.ldraw.gears import CONNECTION, coupled, find_meshes, mesh_findings, mesh_joints
+from technic.ldraw.seats import tyre_findings
 
 __all__ = ["INSIDE", "join", "rejoin"]
 
@@ -62,6 +63,7 @@ def join(assembly: Assembly, joining: Joining, *, again: bool = False) -> Assemb
         findings=(
             *changed.findings,
             *_unsettled(findings_of(found[-1], joints), joints),
+            *tyre_findings(changed.parts),
             *mesh_findings(changed.parts, meshes, holding),
         ),
     )

@@ -13,13 +13,13 @@ from typing import Final
 
 import numpy as np
 
-from technic.assembly.model import Part
+from technic.assembly.model import Finding, FindingKind, Part
 from technic.geometry import Array
 from technic.ldraw.matching import Limits
 from technic.parts.definition import PortKind
 from technic.units import LDU, PITCH
 
-__all__ = ["DOGS", "PLANET", "RING", "TURNTABLE", "TYRE", "Seat", "seats"]
+__all__ = ["DOGS", "PLANET", "RING", "TURNTABLE", "TYRE", "Seat", "seats", "tyre_findings"]
 
 TYRE = "tyre/rim"
 TURNTABLE = "turntable/turntable"
@@ -102,6 +102,16 @@ def seats(parts: Sequence[Part], limits: Limits) -> list[Seat]:
     found += _planets(parts, limits)
     found += _driving(parts, limits)
     return sorted(found, key=lambda seat: seat.parts)
+
+
+def tyre_findings(parts: Sequence[Part]) -> tuple[Finding, ...]:
+    """Return what is said of the tyres: one finding for all of them."""
+    tyres = tuple(k for k, part in enumerate(parts) if _is(part, "tyre"))
+    if not tyres:
+        return ()
+    count = "1 tyre" if len(tyres) == 1 else f"{len(tyres)} tyres"
+    message = f"{count}: taken as rigid, what they give is not modelled"
+    return (Finding(FindingKind.FLEXIBLE, message, tyres),)
 
 
 def _planets(parts: Sequence[Part], limits: Limits) -> list[Seat]:
