@@ -92,9 +92,15 @@ class Kinematics:
         return frozenset(k for k, joint in enumerate(joints) if joint.type is JointType.MESH)
 
     @cached_property
+    def pairs(self) -> NDArray[np.int64]:
+        """Parts on both sides of every joint and support, (links, 2); -1 for the ground."""
+        both = [(*owner, -1) if len(owner) == 1 else owner for owner in self.owners]
+        return np.array(both, dtype=np.int64).reshape(-1, 2)
+
+    @cached_property
     def link_component(self) -> NDArray[np.int64]:
         """Component of every joint and support."""
-        return self.component_of[np.array([owner[0] for owner in self.owners], dtype=np.int64)]
+        return self.component_of[self.pairs[:, 0]]
 
     @cached_property
     def _links(self) -> tuple[tuple[int, ...], ...]:

@@ -125,8 +125,8 @@ def _local_kind(kin: Kinematics, cluster: Cluster, motion: LocalMotion) -> Motio
 
 def _ball_centers(kin: Kinematics, cluster: Cluster) -> set[tuple[float, ...]] | None:
     """Return the distinct centres when all joints of the cluster are balls, else None."""
-    joints = kin.assembly.joints
-    if any(k >= len(joints) or joints[k].held[3:].any() for k in cluster.outer):
+    joints, outer = kin.assembly.joints, list(cluster.outer)
+    if not outer or max(outer) >= len(joints) or kin.held[outer, 3:].any():
         return None
     points = np.array([joints[k].point for k in cluster.outer]).reshape(-1, 3)
     return set(map(tuple, (points.round(6) + 0.0).tolist()))
@@ -195,17 +195,13 @@ def _freed_by(kin: Kinematics, parts: list[int], twists: Array) -> tuple[int, ..
 
     A joint to a fastener that is not itself listed counts when the listed part moves there.
     """
-    scaled = {p: t / kin.units for p, t in zip(parts, twists, strict=True)}
-    size = max(float(np.abs(t).max()) for t in scaled.values())
-    out = []
-    for k in sorted({k for p in parts for k in kin.touching[p]}):
-        owner = kin.owners[k]
-        if len(owner) != 2 or k in kin.meshes:
-            continue
-        slip = sum(
-            (kin.sides[k, s] @ scaled[p] for s, p in enumerate(owner) if p in scaled), np.zeros(6)
-        )
-        free = ~kin.held[k]
-        if np.abs(slip[free]).max(initial=0.0) > MOTION_KIND_CUT * size:
-            out.append(k)
-    return tuple(out)
+    moved = np.zeros((len(kin.assembly.parts) + 1, 6))
+    moved[parts] = twists / kin.units
+    links = np.array(
+        sorted({k for p in parts for k in kin.touching[p]} - kin.meshes), dtype=np.int64
+    )
+    links = links[links < len(kin.assembly.joints)]
+    slip = np.einsum("ksij,ksj->ki", kin.sides[links], moved[kin.pairs[links]])
+    slip[kin.held[links]] = 0.0
+    far = np.abs(slip).max(axis=1, initial=0.0) > MOTION_KIND_CUT * float(np.abs(moved).max())
+    return tuple(links[far].tolist())

@@ -161,6 +161,8 @@ def sparse_basis(space: Array, bodies: int, simple: Array | None = None) -> list
         rest = space - simple @ (simple.T @ space)
         u, values, _ = np.linalg.svd(rest, full_matrices=False)
         return first + sparse_basis(u[:, values > MOTION_KIND_CUT], bodies)
+    if space.shape[1] == 1:
+        return [space.reshape(bodies, 6) / np.abs(space).max()]
     out: list[Array] = []
     for group in _independent(space, bodies):
         rows = (6 * np.array(group)[:, None] + np.arange(6)).ravel()
@@ -176,9 +178,9 @@ def _independent(space: Array, bodies: int) -> list[tuple[int, ...]]:
     """Return groups of bodies such that the space is the direct sum of its parts on the groups."""
     projector = space @ space.T
     ties = np.abs(projector).reshape(bodies, 6, bodies, 6).max(axis=(1, 3)) > MOTION_KIND_CUT**2
-    moving = np.flatnonzero(np.diagonal(ties))
-    pairs = ((int(a), int(b)) for a, b in np.argwhere(ties) if a < b and ties[a, a] and ties[b, b])
-    return connected_groups([int(b) for b in moving], pairs)
+    moving = np.diagonal(ties)
+    pairs = np.argwhere(np.triu(ties & moving & moving[:, None], 1))
+    return connected_groups(np.flatnonzero(moving).tolist(), ((int(a), int(b)) for a, b in pairs))
 
 
 def _hold_others(blocks: Array, body: int, moving: list[int]) -> Array:
