@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -30,6 +30,7 @@ from technic.geometry import Pose
 from technic.ldraw.connect import AxleSlide
 from technic.ldraw.document import Document, Placement, placements, poses, read
 from technic.ldraw.finder import LibrarySource, PartFinder, ShadowSource
+from technic.ldraw.hoses import beside_flexible
 from technic.ldraw.inner import InnerMotion, divide
 from technic.ldraw.joining import join
 from technic.parts.definition import LIBRARY_FAMILY, PartDefinition
@@ -146,7 +147,8 @@ def load_ldraw(
     )
     corrections = None if overrides is None else read_overrides(overrides)
     how = Joining(table or default_table(), axle_slide, gears, corrections, str(overrides or ""))
-    return join(assembly, how)
+    joined = join(assembly, how)
+    return replace(joined, findings=beside_flexible(joined, reading.flexible))
 
 
 def lookup(library: LibrarySource = None, shadow: ShadowSource = None) -> PartFinder:

@@ -73,3 +73,26 @@ def test_tyres_are_bodies_and_one_item(tmp_path):
     (message,), parts = items(tmp_path, text)
     assert message.startswith("4 tyres: taken as rigid")
     assert parts == 9
+
+
+def test_what_only_a_hose_holds_is_said(tmp_path):
+    """A half pin with a stud, on which the hose sits; one with nothing around."""
+    pin = "1 0 {x} 0 0 1 0 0 0 1 0 0 0 1 4274.dat\n"
+    hose = "1 0 {x} 0 0 1 0 0 0 1 0 0 0 1 77.dat\n"
+    path = tmp_path / "m.ldr"
+    path.write_text("0 M\n" + BEAM + pin.format(x=300) + hose.format(x=305) + pin.format(x=900))
+    assembly = load_ldraw(path)
+    held = {
+        assembly.parts[f.parts[0]].id: "a hose holds it" in f.message
+        for f in assembly.findings
+        if f.kind is FindingKind.LOOSE
+    }
+    assert held["m.ldr/3:4274"]
+    assert not held["m.ldr/5:4274"]
+    ends = {
+        assembly.parts[f.parts[0]].id: f.message
+        for f in assembly.findings
+        if f.kind is FindingKind.OPEN_PORT
+    }
+    assert ends["m.ldr/3:4274"].endswith("nothing there but a hose, which is not modelled")
+    assert ends["m.ldr/5:4274"].endswith("nothing there")
