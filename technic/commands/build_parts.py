@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import nullcontext
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from technic.commands.options import JsonOption, QuietOption
 
+if TYPE_CHECKING:
+    from technic.fem.solid.settings import MeshSettings
+    from technic.fem.solid.superelement import SuperElement
+    from technic.parts.definition import PartDefinition
+
 __all__ = ["build"]
+
+
+DRAFT_CELL = 1.2e-3
+"""Of `--draft` (m)."""
 
 
 def _target() -> Path:
@@ -21,14 +32,45 @@ def _target() -> Path:
     return Path(str(files("parts_library").joinpath(FILE)))
 
 
+def _built(
+    chosen: list[PartDefinition], settings: MeshSettings, jobs: int, *, quiet: bool
+) -> tuple[dict[str, SuperElement], dict[str, str]]:
+    """Build with a bar for somebody who watches, a line for each part for others."""
+    from technic.commands.progress import progress_bar
+    from technic.fem.solid.store import build as build_all
+
+    done = 0
+    lines = not quiet and not sys.stderr.isatty()
+    with nullcontext(None) if quiet else progress_bar() as tell:
+
+        def progress(part: str, failure: str | None) -> None:
+            nonlocal done
+            done += 1
+            if tell is not None:
+                tell("meshing", done, len(chosen))
+            if lines:
+                said = "" if failure is None else f": {failure}"
+                typer.echo(f"{done}/{len(chosen)} {part}{said}", err=True)
+
+        return build_all(chosen, settings, jobs=jobs, progress=progress)
+
+
 def build(
     numbers: Annotated[
         list[str] | None,
         typer.Argument(metavar="[ID]...", help="Parts to build; without any, all of them."),
     ] = None,
     cell: Annotated[
-        float, typer.Option("--cell", min=0.3, max=4.0, metavar="MM", help="Edge of a cell.")
-    ] = 0.8,
+        float | None,
+        typer.Option("--cell", min=0.3, max=4.0, metavar="MM", help="Edge of a cell (0.8)."),
+    ] = None,
+    draft: Annotated[
+        bool,
+        typer.Option(
+            "--draft",
+            help="Cells of 1.2 mm: a sixth of the time; for trying shapes out, with --out.",
+        ),
+    ] = False,
     jobs: Annotated[int, typer.Option("--jobs", min=1, metavar="N", help="Processes.")] = 1,
     out: Annotated[
         Path | None,
@@ -43,13 +85,22 @@ def build(
 
     from technic.errors import UsageError
     from technic.fem.solid.settings import MeshSettings
-    from technic.fem.solid.store import build as build_all
     from technic.fem.solid.store import has_solid_model, read, shape_key, write
     from technic.parts.catalogue import catalogue
     from technic.parts.shapes import is_approximate
     from technic.report.json import STDOUT, write_json
     from technic.units import MM
 
+    if draft and cell is not None:
+        raise UsageError("--draft and --cell exclude each other")
+    settings = MeshSettings(cell=DRAFT_CELL if draft else MeshSettings().cell)
+    if cell is not None:
+        settings = MeshSettings(cell=cell * MM)
+    if out is None and settings != MeshSettings():
+        raise UsageError(
+            f"the shipped file has cells of {MeshSettings().cell / MM:g} mm, and an analysis reads no "
+            "others from it; write these elsewhere with --out FILE"
+        )
     known = {d.id: d for d in catalogue()}
     chosen = []
     for number in numbers or known:
@@ -59,18 +110,7 @@ def build(
         # a shape that is right in volume only says nothing about stiffness
         if numbers or (has_solid_model(definition) and not is_approximate(definition)):
             chosen.append(definition)
-    done = 0
-
-    def progress(part: str, failure: str | None) -> None:
-        nonlocal done
-        done += 1
-        if not quiet:
-            said = "" if failure is None else f": {failure}"
-            typer.echo(f"{done}/{len(chosen)} {part}{said}", err=True)
-
-    elements, failures = build_all(
-        chosen, MeshSettings(cell=cell * MM), jobs=jobs, progress=progress
-    )
+    elements, failures = _built(chosen, settings, jobs, quiet=quiet)
     target = out or _target()
     built = set(elements)
     if target.exists():

@@ -1,0 +1,53 @@
+"""`technic parts build`: what it writes, where, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from technic import cli
+from technic.fem.solid.settings import MeshSettings
+from technic.fem.solid.store import read
+
+
+def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
+    monkeypatch.setattr(sys, "argv", ["technic", "parts", "build", *map(str, arguments)])
+    try:
+        cli.main()
+    except SystemExit as end:
+        return int(end.code or 0)
+    return 0
+
+
+def test_draft_goes_to_a_file_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "draft.zip"
+    assert run(monkeypatch, "43857", "2780", "--draft", "--out", target, "--json", "-") == 0
+    out, err = capsys.readouterr()
+    said = json.loads(out)
+    assert said["built"]["43857"]["cell_mm"] == pytest.approx(1.2)
+    assert list(said["failed"]) == ["2780"]  # a pin: its give is in the joints
+    assert "1/2" in err
+    made = read(target, "43857")
+    assert made is not None
+    assert made.cell == pytest.approx(1.2e-3)
+
+
+@pytest.mark.parametrize("option", [("--draft",), ("--cell", "1.0")])
+def test_other_cells_never_go_into_the_shipped_file(
+    option: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(monkeypatch, "43857", *option) == 2
+    assert f"{MeshSettings().cell * 1e3:g} mm" in capsys.readouterr().err
+
+
+def test_contradiction_and_unknown_part(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(monkeypatch, "43857", "--draft", "--cell", "1.0", "--out", tmp_path / "x.zip") == 2
+    assert run(monkeypatch, "nosuchpart") == 2
+    assert "no part 'nosuchpart'" in capsys.readouterr().err
