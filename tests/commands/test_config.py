@@ -109,6 +109,10 @@ def test_the_text_names_the_table_and_where_it_was_found(run, tmp_path):
     assert "with 95 % confidence" in out
     assert "does not depend on the calibration" in out
     assert "measured with parts taken as frame" in out
+    assert run("analyze", model, "-q", "--report", tmp_path / "page.html")[0] == 0
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "Table: here (technic.toml beside the model:" in page
+    assert "within their uncertainty" in page or "order is not sure" in page
     _, out, _ = run("deflect", model, "--fix", "2:32316", "--hang", "3:32316:hole5:50g")
     assert "with 95 % confidence" in out
 

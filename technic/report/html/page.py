@@ -23,6 +23,7 @@ from technic.report.html.tables import (
 from technic.report.pattern import describe_field
 from technic.report.wording import count, number
 from technic.report.worst_field import worst_field
+from technic.rigidity.provenance import spots_sentence, table_sentences
 from technic.rigidity.result import RigidityReport, Verdict
 from technic.rigidity.sentences import import_effects
 from technic.rigidity.serialize import size_mm
@@ -126,6 +127,8 @@ def page(
         picture=None if picture is None else embedded(picture),
         spots=spot_rows(report),
         spot_count=len(report.weak_spots),
+        spots_sure=spots_sentence(report),
+        table=table_sentences(report),
         motions=motion_rows(report, played),
         motion_count=len(report.motions) - sum(m.kind == "idle" for m in report.motions),
         idle=report.mobility.idle,
