@@ -215,24 +215,31 @@ def _elements(
         point = assembly.parts[support.part].centroid if support.point is None else support.point
         links.append((point, (support.part,), (None,)))
     links += [(probe.point, (probe.part,), (probe.port,)) for probe in probes]
-    attached: list[list[tuple[Array, str | None]]] = [[] for _ in assembly.parts]
+    attached: list[list[tuple[int, str | None]]] = [[] for _ in assembly.parts]
     place: list[list[tuple[int, int]]] = []
+    owners: list[int] = []
+    points: list[Array] = []
     for point, parts, ports in links:
         row = []
         for index, port in zip(parts, ports, strict=True):
-            local = assembly.parts[index].pose.to_local(point)
-            # rounding to a nanometre makes equal parts share one element
-            attached[index].append((local.round(9) + 0.0, port))
+            attached[index].append((len(owners), port))
+            owners.append(index)
+            points.append(point)
             row.append((index, len(attached[index]) - 1))
         place.append(row)
+    turns = np.array([p.pose.rotation for p in assembly.parts]).reshape(-1, 3, 3)
+    shifts = np.array([p.pose.translation for p in assembly.parts]).reshape(-1, 3)
+    local = np.array(points).reshape(-1, 3) - shifts[owners]
+    # rounding to a nanometre makes equal parts share one element
+    local = np.einsum("kji,kj->ki", turns[owners], local).round(9) + 0.0
     cache: dict[object, Element] = {}
     elements = []
     for part, items in zip(assembly.parts, attached, strict=True):
-        points = np.array([p for p, _ in items]).reshape(-1, 3)
+        at = local[[k for k, _ in items]]
         names = tuple(port for _, port in items)
-        key = (_identity(part.body, part.mass_properties, part.number), names, points.tobytes())
+        key = (_identity(part.body, part.mass_properties, part.number), names, at.tobytes())
         if key not in cache:
-            made = element(part, points, names)
+            made = element(part, at, names)
             cache[key] = in_plane(made) if assembly.dimension == 2 else made
         elements.append(cache[key])
     frames: list[tuple[Array | None, Array | None]] = []
@@ -242,13 +249,17 @@ def _elements(
         for side, (index, slot) in enumerate(row):
             owner = elements[index]
             pair[side] = owner.frames[slot]
-            origins[k, side] = assembly.parts[index].pose.points(owner.frame_points[slot])
+            origins[k, side] = turns[index] @ owner.frame_points[slot] + shifts[index]
         frames.append((pair[0], pair[1]))
     return tuple(elements), frames, origins
 
 
 def _identity(body: Body, properties: MassProperties, number: str) -> tuple[int, int, str]:
     return id(body), id(properties), number
+
+
+_BATCH = 512
+"""Frames multiplied at a time: enough to be fast, few enough to stay small."""
 
 
 def _joint_matrix(
@@ -262,26 +273,32 @@ def _joint_matrix(
     """Return ``A``: row r is ``C_k (T_i W_i x_i - T_j W_j x_j)`` for its link k."""
     count = len(rows.link)
     owners = [j.parts for j in assembly.joints] + [(s.part, s.part) for s in assembly.supports]
+    number = np.full((len(owners), 6), -1, dtype=np.int64)
+    number[rows.link, rows.motion] = np.arange(count)
+    # frames of equal width are multiplied together
+    widths: dict[int, list[tuple[int, int]]] = {}
+    for k, pair in enumerate(frames[: len(owners)]):
+        for side, frame in enumerate(pair):
+            if frame is not None:
+                widths.setdefault(frame.shape[1], []).append((k, side))
     data, row_index, column_index = [], [], []
-    first = np.searchsorted(rows.link, np.arange(len(owners) + 1))
-    for k, parts in enumerate(owners):
-        chosen = slice(first[k], first[k + 1])
-        motions = rows.motion[chosen]
-        for side in (0, 1):
-            w = frames[k][side]
-            if w is None:
-                continue
-            columns = np.flatnonzero(w.any(axis=0))
-            block = sides[side][k][motions] @ w[:, columns]
-            data.append(block.ravel())
-            row_index.append(np.repeat(np.arange(first[k], first[k + 1]), len(columns)))
-            column_index.append(np.tile(columns + offsets[parts[side]], len(motions)))
+    both = np.stack(sides)
+    for chosen in widths.values():
+        for start in range(0, len(chosen), _BATCH):
+            batch = chosen[start : start + _BATCH]
+            link, side = np.array(batch).T
+            stacked = np.array([frames[k][s] for k, s in batch])
+            blocks = both[side, link] @ stacked
+            row = np.broadcast_to(number[link][:, :, None], blocks.shape)
+            used = (row >= 0) & (blocks != 0.0)
+            first = offsets[[owners[k][s] for k, s in batch]]
+            data.append(blocks[used])
+            row_index.append(row[used])
+            column_index.append((first[:, None, None] + np.arange(blocks.shape[2]) + 0 * row)[used])
     if not data:
         return sparse.csr_array((count, n))
-    values = np.concatenate(data)
-    keep = values != 0.0
-    coordinates = (np.concatenate(row_index)[keep], np.concatenate(column_index)[keep])
-    return sparse.csr_array((values[keep], coordinates), shape=(count, n))
+    coordinates = (np.concatenate(row_index), np.concatenate(column_index))
+    return sparse.csr_array((np.concatenate(data), coordinates), shape=(count, n))
 
 
 def _block_diagonal(blocks: list[Array]) -> sparse.csr_array:
