@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
-from technic.assembly.model import Assembly, FindingKind
+from technic.assembly.joint_types import HELD, JointType
+from technic.assembly.model import Assembly, FindingKind, Joint
 from technic.assembly.stiffness import default_table
 from technic.groups import connected_groups
 from technic.ldraw.connect import link
@@ -16,7 +18,9 @@ from technic.ldraw.library import Library
 from technic.ldraw.reader import load_ldraw
 from technic.ldraw.shadow import ShadowLibrary
 from technic.parts.definition import PortKind
+from technic.rigidity.analyze import analyze
 from technic.rigidity.kinematics import component_motions, kinematics
+from technic.rigidity.result import MotionKind
 from technic.units import LDU
 
 pytestmark = pytest.mark.slow
@@ -169,3 +173,51 @@ def test_meshes_are_those_that_are_there(model, library, name):
             place = abs(between @ across)
             wanted = one.radius + two.radius
         assert place == pytest.approx(wanted, abs=0.05 * LDU)
+
+
+def as_type(assembly: Assembly, chosen: Callable[[Joint], bool], type_: JointType) -> Assembly:
+    """The assembly with some joints of another type."""
+    held = np.array(HELD[type_])
+    return replace(
+        assembly,
+        joints=tuple(
+            replace(j, type=type_, held=held, stiffness=np.where(held, 1e4, 0.0))
+            if chosen(j)
+            else j
+            for j in assembly.joints
+        ),
+    )
+
+
+def single_stud(joint: Joint) -> bool:
+    return joint.connection.startswith("stud") and joint.type is JointType.HINGE
+
+
+def test_the_droids_count_differs_from_the_other_one_for_these_reasons(model, library):
+    """About 94 / 32 there; the table of docs/importing.md."""
+    droid = load_ldraw(model("omr_8002_destroyer_droid.mpd"), library=library)
+    fixed = as_type(
+        droid, lambda j: single_stud(j) and j.connection == "stud/tube", JointType.FIXED
+    )
+    stopped = as_type(
+        fixed,
+        lambda j: j.connection == "axle/pin_hole" and "32184" in j.id and j.missing_stop == "both",
+        JointType.HINGE,
+    )
+    counts = []
+    for assembly in (droid, fixed, stopped):
+        mobility = analyze(assembly, parts="rigid").mobility
+        counts.append((mobility.total, mobility.structural + mobility.spinning + mobility.sliding))
+    assert counts == [(108, 27), (101, 27), (100, 26)]
+    turning = [
+        motion
+        for motion in analyze(stopped, parts="rigid").motions
+        if motion.kind is MotionKind.IDLE and len(motion.parts) > 1
+    ]
+    assert len(turning) == 6  # axles with their bushes and joiners: structural there
+
+
+def test_the_backhoes_count_differs_by_single_studs_and_a_click_hinge(model, library):
+    """65 / 17 there."""
+    backhoe = load_ldraw(model("omr_42004_mini_backhoe.mpd"), library=library)
+    assert total(as_type(backhoe, single_stud, JointType.FIXED)) == 65 + 1
