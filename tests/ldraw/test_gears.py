@@ -205,3 +205,57 @@ def test_official_models_lose_a_motion_per_mesh(model, name, lost):
 def test_gears_is_off_or_on(model):
     with pytest.raises(UsageError, match="gears"):
         load_ldraw(model("hinged_L.ldr"), gears="maybe")  # type: ignore[arg-type]
+
+
+DIFFERENTIAL = """0 A differential on two half axles, held by two beams
+1 71 0 0 0 1 0 0 0 1 0 0 0 1 62821.dat
+1 19 0 0 -17 1 0 0 0 1 0 0 0 1 6589.dat
+1 19 0 0 17 1 0 0 0 -1 0 0 0 -1 6589.dat
+1 0 0 0 -72 0 0 1 0 1 0 -1 0 0 3706.dat
+1 0 0 0 72 0 0 1 0 1 0 -1 0 0 3706.dat
+1 4 0 0 -100 1 0 0 0 0 1 0 -1 0 32316.dat
+1 4 0 0 100 1 0 0 0 0 1 0 -1 0 32316.dat
+1 19 17 0 0 0 0 -1 0 1 0 1 0 0 6589.dat
+1 19 -17 0 0 0 0 1 0 1 0 -1 0 0 6589.dat
+"""
+
+
+def test_a_differential_has_two_motions(tmp_path):
+    """Its planets turn on the stubs of the casing; with the teeth, casing and half axles are left two
+    motions: half axles turn against each other, or all together. The casing turns by the mean.
+    """
+    path, file = tmp_path / "d.ldr", tmp_path / "o.toml"
+    path.write_text(DIFFERENTIAL)
+    file.write_text('schema = "technic-overrides/1"\n[[weld]]\nparts = ["7:32316", "8:32316"]\n')
+    free, tied = (load_ldraw(path, gears=gears, overrides=file) for gears in ("off", "on"))
+    assert not [f for f in free.findings if f.kind is FindingKind.LOOSE]
+    planets = [j for j in free.joints if j.connection == "planet/differential"]
+    assert len(planets) == 2
+    assert sum(j.type is JointType.MESH for j in tied.joints) == 4
+    before, after = (analyze(assembly, parts="rigid") for assembly in (free, tied))
+    # casing, two half axles, two planets; four rows of teeth, one of which the others imply
+    turning = [r.mobility.structural + r.mobility.spinning for r in (before, after)]
+    assert turning == [5, 2]
+    assert before.mobility.total - after.mobility.total == 3
+
+    def turned(casing: float, low: float, high: float, planet: float) -> float:
+        """Largest speed of teeth through each other when the wheels turn by these angles."""
+        z, x = np.array([0, 0, 1.0]), np.array([1.0, 0, 0])
+        spin = {
+            "d.ldr/2:62821": casing * z,
+            "d.ldr/3:6589": low * z,
+            "d.ldr/4:6589": high * z,
+            "d.ldr/9:6589": casing * z + planet * x,
+            "d.ldr/10:6589": casing * z - planet * x,
+        }
+        worst = 0.0
+        for joint in tied.joints:
+            if joint.type is JointType.MESH:
+                speed = [np.cross(spin[tied.parts[k].id], joint.point) for k in joint.parts]
+                worst = max(worst, abs(float((speed[0] - speed[1]) @ joint.axes[0])))
+        return worst
+
+    assert turned(1.0, 1.0, 1.0, 0.0) < 1e-12
+    assert min(turned(0.0, 1.0, -1.0, s) for s in (1.0, -1.0)) < 1e-12
+    assert min(turned(0.5, 1.0, 0.0, s) for s in (0.5, -0.5)) < 1e-12
+    assert turned(0.0, 1.0, 1.0, 0.0) > 1e-3
