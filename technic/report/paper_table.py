@@ -19,7 +19,7 @@ import numpy as np
 from technic.assembly.model import Assembly
 from technic.loading import load
 from technic.rigidity.analyze import analyze
-from technic.rigidity.replica import replicate
+from technic.rigidity.replica import PaperBars
 from technic.rigidity.result import RigidityReport, Verdict
 
 __all__ = ["PaperTable", "Row", "paper_table", "to_dict", "to_text"]
@@ -130,7 +130,8 @@ def _row(folder: Path, entry: dict[str, Any]) -> Row:
     total = perf_counter() - start
     replica = None
     if "replica" in entry:
-        replica = replicate(assembly, **entry["replica"]).value
+        recipe = PaperBars(**entry["replica"])
+        replica = _rigidity(analyze(assembly, modes=1, measure="nodal", parts=recipe))
     return Row(
         figure=entry["figure"],
         file=entry["file"],

@@ -25,6 +25,7 @@ from technic.rigidity.kinematics import (
     kinematics,
 )
 from technic.rigidity.motions import SortedMotions, sort_motions
+from technic.rigidity.replica import PaperBars, paper_elements, paper_joints
 from technic.rigidity.result import (
     Component,
     Mobility,
@@ -65,7 +66,7 @@ def analyze(
     *,
     measure: Measure = "mean_square",
     modes: int = 6,
-    parts: PartModel = "solid",
+    parts: PartModel | PaperBars = "solid",
     port_walls: PortWalls = "mean",
     table: StiffnessTable | None = None,
 ) -> RigidityReport:
@@ -79,9 +80,11 @@ def analyze(
         independent of the mesh), or the unweighted node displacements of the paper.
     modes : int
         Elastic modes of the heaviest component.
-    parts : {"solid", "frame", "rigid"}
+    parts : {"solid", "frame", "rigid"} or PaperBars
         What parts are made of: condensed solid models where they are shipped (elsewhere frame
         members, or rigid bodies where a part has none), frame members, or rigid bodies.
+        `technic.rigidity.replica.PaperBars`, with the nodal measure, gives the paper's own numbers:
+        strips of springs without units, joined rigidly.
     port_walls : {"mean", "rigid"}
         "rigid": also find the rigidity with bores that keep their shape, the upper bound. Their
         matrices are built when first needed (seconds for each kind of part) and kept in the cache.
@@ -96,19 +99,21 @@ def analyze(
     Raises
     ------
     UsageError
-        Rigid walls are asked for parts that are not solid models.
+        Rigid walls are asked for parts that are not solid models, or the paper's bars for anything but
+        a two-dimensional linkage of straight bars.
     NumericalError
         The eigenvalue step failed.
     """
     if port_walls == "rigid" and parts != "solid":
         raise UsageError("rigid port walls are for solid models of parts (parts: solid)")
+    kind = "paper" if isinstance(parts, PaperBars) else parts
     timings: dict[str, float] = {}
     # small decompositions by the hundred: a second thread makes them seven times slower
     with _timed(timings, "mobility"), single_thread():
         kin = kinematics(assembly)
         bodies = [_body(kin, c) for c in range(len(kin.components))]
     with _timed(timings, "assemble"):
-        system = assemble(assembly, element=FACTORIES[parts])
+        system = _system(assembly, parts)
     with _timed(timings, "eigen"):
         pencils = [_pencil(system, kin, body.motions, measure) for body in bodies]
         found = [
@@ -160,9 +165,9 @@ def analyze(
             for b, (rigidity, _) in zip(bodies, found, strict=True)
         ),
         unknowns=system.size,
-        part_models=models_of(assembly, parts),
-        plain_parts=plain_parts(assembly, parts),
-        library_models=library_models(assembly, parts),
+        part_models=models_of(assembly, kind),
+        plain_parts=plain_parts(assembly, kind),
+        library_models=library_models(assembly, kind),
         mass=system.mass,
         qualifier=_qualifier(assembly),
         not_modelled=not_modelled(assembly),
@@ -172,6 +177,12 @@ def analyze(
         node_points=fields[0],
         node_displacements=fields[1],
     )
+
+
+def _system(assembly: Assembly, parts: PartModel | PaperBars) -> System:
+    if isinstance(parts, PaperBars):
+        return assemble(paper_joints(assembly), element=paper_elements(assembly, parts))
+    return assemble(assembly, element=FACTORIES[parts])
 
 
 def _body(kin: Kinematics, component: int) -> _Body:

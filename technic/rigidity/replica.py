@@ -1,8 +1,8 @@
-"""The paper's numbers, computed the paper's way: springs without units, nodal measure, null spaces.
+"""The paper's own discretisation: springs without units, joints held rigidly on two nodes of each bar.
 
 It answers one question: does the program, given the paper's discretisation, come to the paper's values?
-Fig. 12 (a1) to (a4) and Table 1 of Fig. 10 (b) can be checked that way; the other models' units and meshes
-are not published.
+``analyze(assembly, measure="nodal", parts=PaperBars())`` gives Fig. 12 (a1) to (a4), and with
+``PaperBars(by_length=True)`` Table 1 of Fig. 10 (b); the other models' units and meshes are not published.
 """
 
 from __future__ import annotations
@@ -10,138 +10,120 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import linalg
+from numpy.typing import NDArray
 
-from technic.assembly.model import Assembly
+from technic.assembly.model import Assembly, Part
 from technic.errors import UsageError
 from technic.fem.element import Element
 from technic.fem.paper_bar import paper_bar
 from technic.geometry import Array
 from technic.parts.definition import FrameBody
-from technic.rigidity.kinematics import component_motions, kinematics
-from technic.system.paper import allowed_motions, held_combinations
+from technic.system.paper import rigid_displacements
+from technic.system.part_models import ElementFactory
 
-__all__ = ["Replica", "replicate"]
+__all__ = ["PaperBars", "paper_elements", "paper_joints"]
 
 FEWEST = 2
 """Stations of the shortest bar when stations are shared out by length."""
 
+PLANE = np.array([0, 1, 5])
+"""Motions of a twist that stay in the plane z = 0."""
+
 
 @dataclass(frozen=True, slots=True)
-class Replica:
-    """What the paper's discretisation gives.
+class PaperBars:
+    """How the paper divides the bars of its two-dimensional linkages.
 
     Parameters
     ----------
-    value : float
-        Smallest eigenvalue, in the paper's units; exactly 0 when the assembly can move.
-    nodes : int
-    """
-
-    value: float
-    nodes: int
-
-
-def replicate(
-    assembly: Assembly,
-    *,
-    unit: float = 0.01,
-    stations: int = 5,
-    thickness: float = 0.3,
-    by_length: bool = False,
-) -> Replica:
-    """Return the paper's rigidity of a two-dimensional linkage of straight bars.
-
-    Parameters
-    ----------
-    assembly : Assembly
-        Bars joined in any way, in two dimensions. Supports hold the node nearest to their point.
     unit : float
-        Metres per unit of length of the paper's model.
+        Metres per unit of length of the paper's model. Springs have no unit: nor has the rigidity.
     stations : int
         Pairs of nodes per bar.
     thickness : float
         Of the bars, in the paper's units.
     by_length : bool
         True to give longer bars more stations, so that `stations` is the mean (as in Fig. 10 (b)).
+    """
+
+    unit: float = 0.01
+    stations: int = 5
+    thickness: float = 0.3
+    by_length: bool = False
+
+
+def paper_joints(assembly: Assembly) -> Assembly:
+    """Return the assembly with every joint held rigidly, as the paper's null spaces hold them."""
+    stiffness = np.full(6, np.inf)
+    joints = tuple(replace(joint, stiffness=stiffness) for joint in assembly.joints)
+    return replace(assembly, joints=joints)
+
+
+def paper_elements(assembly: Assembly, recipe: PaperBars) -> ElementFactory:
+    """Return what makes the elements of a two-dimensional linkage of straight bars.
+
+    A joint takes hold of the two nodes of a bar that are nearest to it: of their rigid motion, not of their
+    deformation, as the null space of ``A_allow`` does (`technic.system.paper`). A support takes hold of the
+    nearest node.
 
     Raises
     ------
     UsageError
         The assembly is not two-dimensional, or a part is no straight bar.
     """
-    ends = _ends(assembly, unit)
-    counts = [stations] * len(ends)
-    if by_length:
-        lengths = np.array([np.linalg.norm(q - p) for p, q in ends])
-        share = lengths.sum() / (stations * len(ends))
-        counts = [max(FEWEST, int(np.rint(length / share))) for length in lengths]
-    bars = [paper_bar(p, q, n, thickness) for (p, q), n in zip(ends, counts, strict=True)]
-    offsets = np.concatenate([[0], np.cumsum([bar.size for bar in bars])]).astype(int)
-    nodes = int(offsets[-1]) // 2
-    kin = kinematics(assembly)
-    moves = sum(component_motions(kin, c).internal for c in range(len(kin.components)))
-    if moves or len(kin.components) > 1:
-        return Replica(0.0, nodes)
-    held = [_joint_rows(assembly, k, unit, bars, offsets) for k in range(len(assembly.joints))]
-    for support in assembly.supports:
-        bar, start = bars[support.part], int(offsets[support.part])
-        point = assembly.parts[support.part].centroid if support.point is None else support.point
-        node = int(np.argmin(_gaps(bar, np.asarray(point) / unit)))
-        rows = np.zeros((2, int(offsets[-1])))
-        rows[[0, 1], [start + 2 * node, start + 2 * node + 1]] = 1.0
-        held.append(rows[np.asarray(support.held[:2])])
-    if not assembly.supports:
-        held.append(_rigid_motions(bars))
-    space = linalg.null_space(np.vstack(held))
-    stiffness = linalg.block_diag(*[bar.stiffness for bar in bars])
-    values = np.linalg.eigvalsh(space.T @ stiffness @ space)
-    return Replica(float(values[0]), nodes)
-
-
-def _ends(assembly: Assembly, unit: float) -> list[tuple[Array, Array]]:
     if assembly.dimension != 2:
         raise UsageError("the paper's bars are two-dimensional")
-    ends = []
     for part in assembly.parts:
-        corners = len(part.shape.get("points", ()))
-        if not isinstance(part.body, FrameBody) or corners != 2:
+        if not isinstance(part.body, FrameBody) or len(part.shape.get("points", ())) != 2:
             raise UsageError(f"part {part.id!r} is no straight bar")
-        p, q = part.pose.points(part.body.points[[0, -1]])
-        ends.append((p / unit, q / unit))
-    return ends
-
-
-def _gaps(bar: Element, at: Array) -> Array:
-    # Nodes in pairs lie equally far from most joints. Which of them is taken changes the value by a
-    # per mille; rounding decides, as in the paper's computation.
-    return np.asarray(np.linalg.norm(bar.node_points - at, axis=1))
-
-
-def _joint_rows(
-    assembly: Assembly, link: int, unit: float, bars: list[Element], offsets: Array
-) -> Array:
-    """Return the null space of ``A_allow^T`` of the two nearest nodes of both bars."""
-    joint = assembly.joints[link]
-    at = joint.point / unit
-    chosen = [np.argsort(_gaps(bars[p], at), kind="stable")[:2] for p in joint.parts]
-    points = [bars[p].node_points[own] for p, own in zip(joint.parts, chosen, strict=True)]
-    rows = held_combinations(allowed_motions(replace(joint, point=at), points[0], points[1], 2))
-    columns = np.concatenate(
-        [
-            int(offsets[p]) + (2 * own[:, None] + np.arange(2)).ravel()
-            for p, own in zip(joint.parts, chosen, strict=True)
-        ]
+    lengths = np.array([np.linalg.norm(np.subtract(*_ends(part))) for part in assembly.parts])
+    stations = np.full(len(lengths), recipe.stations)
+    if recipe.by_length:
+        stations = np.maximum(FEWEST, np.rint(lengths / lengths.mean() * recipe.stations)).astype(
+            np.int64
+        )
+    number = {id(part): k for k, part in enumerate(assembly.parts)}
+    joints = np.bincount(
+        [p for joint in assembly.joints for p in joint.parts], minlength=len(assembly.parts)
     )
-    out = np.zeros((len(rows), int(offsets[-1])))
-    out[:, columns] = rows
-    return out
+
+    def element(part: Part, points: Array, _ports: tuple[str | None, ...]) -> Element:
+        k = number[id(part)]
+        return _bar(part, points, int(joints[k]), int(stations[k]), recipe)
+
+    return element
 
 
-def _rigid_motions(bars: list[Element]) -> Array:
-    """Return the motions of the whole in its plane, as rows."""
-    points = np.vstack([bar.node_points for bar in bars])
-    rows = np.zeros((3, 2 * len(points)))
-    rows[0, 0::2] = rows[1, 1::2] = 1.0
-    rows[2, 0::2], rows[2, 1::2] = -points[:, 1], points[:, 0]
-    return rows
+def _ends(part: Part) -> tuple[Array, Array]:
+    assert isinstance(part.body, FrameBody)
+    return part.body.points[0], part.body.points[-1]
+
+
+def _bar(part: Part, points: Array, joints: int, stations: int, recipe: PaperBars) -> Element:
+    """Return the strip of springs of one bar; attachments are joints first, then supports."""
+    p, q = _ends(part)
+    strip = paper_bar(p / recipe.unit, q / recipe.unit, stations, recipe.thickness)
+    nodes = strip.node_points * recipe.unit
+    frames = np.zeros((len(points), 6, strip.size))
+    for k, at in enumerate(points):
+        # Nodes in pairs lie equally far from most joints. Which of them is taken changes the value by a
+        # per mille; rounding decides, as in the paper's computation.
+        near = np.argsort(np.linalg.norm(nodes - at, axis=1), kind="stable")
+        if k < joints:
+            follow = np.linalg.pinv(rigid_displacements(nodes[near[:2]], at, 2)[:, PLANE])
+            frames[np.ix_(np.array([k]), PLANE, _unknowns(near[:2]))] = follow
+        else:
+            frames[np.ix_(np.array([k]), PLANE[:2], _unknowns(near[:1]))] = np.eye(2)
+    mass = part.mass_properties
+    return replace(
+        strip,
+        mass=np.eye(strip.size) * (mass.mass / len(nodes)),
+        rigid=rigid_displacements(nodes, mass.centroid, 2),
+        frames=frames,
+        frame_points=points,
+        node_points=nodes,
+    )
+
+
+def _unknowns(nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+    return (2 * nodes[:, None] + np.arange(2)).ravel()

@@ -135,7 +135,7 @@ FACTORIES: Final[dict[str, ElementFactory]] = {
 
 
 def model_of(part: Part, parts: str) -> str:
-    """Return what a part is modelled as: "solid", "frame" or "rigid".
+    """Return what a part is modelled as: "solid", "frame", "rigid", or "paper" (strips of springs).
 
     Parameters
     ----------
@@ -143,6 +143,8 @@ def model_of(part: Part, parts: str) -> str:
     parts : str
         What was asked for.
     """
+    if parts == "paper":
+        return parts
     if parts == "solid" and part.definition is not None and solid_model(part.definition):
         return "solid"
     return "rigid" if parts == "rigid" or isinstance(part.body, RigidBody) else "frame"
@@ -151,7 +153,7 @@ def model_of(part: Part, parts: str) -> str:
 def models_of(assembly: Assembly, parts: str) -> dict[str, int]:
     """Count the parts by what they are modelled as."""
     counts = Counter(model_of(part, parts) for part in assembly.parts)
-    return {kind: counts[kind] for kind in ("solid", "frame", "rigid") if counts[kind]}
+    return {kind: counts[kind] for kind in ("solid", "frame", "rigid", "paper") if counts[kind]}
 
 
 def plain_parts(assembly: Assembly, parts: str) -> tuple[PlainPart, ...]:

@@ -7,9 +7,11 @@ import copy
 import numpy as np
 import pytest
 
+from technic.assembly.builder import Linkage
 from technic.assembly.file import build_assembly
+from technic.errors import UsageError
 from technic.rigidity.analyze import analyze
-from technic.rigidity.replica import replicate
+from technic.rigidity.replica import PaperBars
 from technic.rigidity.result import Verdict
 from tests.assembly.reference import document, reference_models
 
@@ -80,14 +82,29 @@ def test_idle_spins_of_the_octahedron_are_idle(models):
 )
 def test_fig_12_comes_out_with_the_papers_discretisation(models, name, printed, share):
     model = build_assembly(document(models[name], grounded=True))
-    assert replicate(model).value == pytest.approx(printed, rel=share, abs=0.0)
+    report = analyze(model, measure="nodal", parts=PaperBars(), modes=1)
+    found = rigidity(report) if report.verdict is Verdict.RIGID else 0.0
+    assert found == pytest.approx(printed, rel=share, abs=0.0)
+    assert report.part_models == {"paper": len(model.parts)}
 
 
 def test_table_1_maple_leaf_comes_out_with_the_papers_discretisation(models):
     model = build_assembly(document(models["maple_leaf_with_R"]))
-    found = replicate(model, by_length=True)
-    assert found.nodes == 200
-    assert found.value == pytest.approx(3.74038015e-08, rel=5e-3)
+    report = analyze(model, measure="nodal", parts=PaperBars(by_length=True), modes=1)
+    assert sum(len(points) for points in report.node_points.values()) == 200
+    assert rigidity(report) == pytest.approx(3.74038015e-08, rel=5e-3)
+
+
+def test_the_papers_bars_are_flat_and_straight(models):
+    for name in ("octahedron_rods_ball_joints", "model_foldable_stage1"):
+        if models[name]["dim"] == 3:
+            model = build_assembly(document(models[name]))
+            with pytest.raises(UsageError, match="two-dimensional"):
+                analyze(model, parts=PaperBars())
+    linkage = Linkage(2)
+    linkage.plate("plate", (0, 0), (0.1, 0), (0, 0.1), thickness=0.01)
+    with pytest.raises(UsageError, match="'plate' is no straight bar"):
+        analyze(linkage.assembly(), parts=PaperBars())
 
 
 def test_more_braces_are_stiffer(models):
