@@ -118,10 +118,18 @@ class Reanalysis:
 
     def element(self, part: Part, points: Array, ports: tuple[str | None, ...]) -> Element:
         """Return a part's element, made once for all models."""
-        key = (id(part.body), id(part.mass_properties), part.number, ports, points.tobytes())
+        order = sorted(range(len(ports)), key=lambda k: (ports[k] or "", points[k].tobytes()))
+        names, places = tuple(ports[k] for k in order), points[order]
+        key = (id(part.body), id(part.mass_properties), part.number, names, places.tobytes())
         if key not in self._elements:
-            self._elements[key] = self._factory(part, points, ports)
-        return self._elements[key]
+            self._elements[key] = self._factory(part, places, names)
+        element = self._elements[key]
+        if order == list(range(len(order))):
+            return element
+        back = np.argsort(order)
+        return replace(
+            element, frames=element.frames[back], frame_points=element.frame_points[back]
+        )
 
     def exact(self, change: Change) -> Forecast:
         """Return what a change does: motions of structure that go, and the rigidity.
@@ -156,11 +164,13 @@ class Reanalysis:
     def new_joints(self, new: Sequence[Part], gone: frozenset[int]) -> list[Joint]:
         """Return the joints of new parts; new part k has the index of the k-th after the present ones.
 
-        Only parts within a pitch of them are looked at.
+        Only parts with connectors within half a pitch of theirs are looked at.
         """
         low, high = _port_boxes(new)
-        low, high = low.min(axis=0) - PITCH, high.max(axis=0) + PITCH
-        meets = ((self._low <= high) & (self._high >= low)).all(axis=1)
+        room = PITCH / 2.0
+        below = (self._low[:, None] <= high + room).all(axis=2)
+        above = (self._high[:, None] >= low - room).all(axis=2)
+        meets = np.any(below & above, axis=1)
         near = [int(k) for k in np.flatnonzero(meets) if int(k) not in gone]
         present = [self.assembly.parts[k] for k in near]
         how = self._joining

@@ -149,7 +149,7 @@ def _bordered(solve: Inverse, border: Array) -> Inverse:
     """Return the inverse under the constraints ``border^T x = 0`` (Schur complement)."""
     if border.shape[1] == 0:
         return lambda load: solve(np.ravel(load))
-    carried = np.column_stack([solve(column) for column in border.T])
+    carried = solve(border)
     schur = linalg.cho_factor(border.T @ carried)
 
     def inverse(load: Array) -> Array:
@@ -193,5 +193,9 @@ def _factor(matrix: sparse.csc_array, constraints: sparse.csr_array, biggest: fl
         factor = sparse_linalg.splu(saddle, permc_spec="COLAMD")
     except RuntimeError as error:
         raise NumericalError(f"the stiffness matrix could not be factorised: {error}") from error
-    zeros = np.zeros(c)
-    return lambda load: factor.solve(np.concatenate([load, zeros]))[:n]
+
+    def padded(load: Array) -> Array:
+        nothing = np.zeros((c, *load.shape[1:]))
+        return np.asarray(factor.solve(np.concatenate([load, nothing]))[:n])
+
+    return padded
