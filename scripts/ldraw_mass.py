@@ -26,6 +26,7 @@ sys.path.insert(0, str(ROOT))
 from technic.geometry import Array  # noqa: E402 (the path is set up first)
 from technic.ldraw.library import Library  # noqa: E402
 from technic.parts.catalogue import Catalogue, read_rows  # noqa: E402
+from technic.parts.families import expand  # noqa: E402
 from technic.parts.materials import ABS, material  # noqa: E402
 from technic.units import LDU  # noqa: E402
 
@@ -194,7 +195,7 @@ def main() -> None:
     surfaces = Surfaces(library)
     names = Catalogue(rows, known)
     for part in asked.only or [p for p in rows if p not in known]:
-        row = rows[part][1]
+        row = expand(*rows[part])
         triangles = surfaces.triangles(f"{part}.dat")
         if len(triangles) == 0:
             print(f"{part}: no geometry", file=sys.stderr)

@@ -101,6 +101,7 @@ def axle(row: Row) -> Plain:
     return {
         "title": f"Axle {row['length']}" + (" with stop" if head else ""),
         "family": "axle-stop" if head else "axle",
+        "material": "POM",
         "fastener": True,
         "ports": ports,
         "frame": f"axle y | {_number(-half)} 0 0 | {_number(half)} 0 0",
