@@ -126,10 +126,6 @@ def test_twist_is_by_far_the_softest(report: RigidityReport) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True,
-    reason="the shape of 87082 has a core of radius 8.5 LDU where counterbores have 8: 3.3 mm3 each",
-)
 def test_no_two_bricks_overlap(chassis: Assembly) -> None:
     manifold = pytest.importorskip("manifold3d")
     from technic.parts.shapes import mesh

@@ -5,24 +5,32 @@ from __future__ import annotations
 import functools
 import json
 import re
+from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from technic.errors import SchemaError, UsageError
 from technic.fem.solid.inside import fill_fractions
+from technic.fem.solid.store import material_of
 from technic.ldraw.library import Library
 from technic.ldraw.triangles import surface_of
 from technic.parts.catalogue import catalogue
 from technic.parts.definition import PartDefinition
-from technic.parts.shapes import has_shape, mesh
+from technic.parts.shapes import has_shape, is_approximate, mesh
 from technic.parts.shapes.kernel import area_radius, axle_outline, circle_points
 from technic.units import LDU
 
 HERE = Path(__file__).parent
 MEASURED = json.loads((HERE / "ldraw_volumes.json").read_text(encoding="utf-8"))
 """Volume (mm3) that the LDraw surface of a part encloses."""
+
+MASSES = json.loads(files("parts_library").joinpath("mass.json").read_text(encoding="utf-8"))
 
 EXACT = re.compile(r"^(beam|frame|pin|axle|bush|connector|cross-block|angle)")
 """Families whose volume must be right within 2 %; all others within 10 %."""
@@ -62,6 +70,62 @@ def test_every_definition_has_a_closed_shape_of_the_right_volume(part: str) -> N
             assert percent == pytest.approx(expected, abs=0.3)
 
 
+def pieces(surface: Any) -> int:
+    """Count the separate bodies of a closed surface (enclosed hollows are not bodies)."""
+    sides = surface.face_adjacency
+    graph = coo_array((np.ones(len(sides)), sides.T), (len(surface.faces),) * 2)
+    _, label = connected_components(graph, directed=False)
+    corners = surface.triangles - surface.centroid
+    volumes = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+    return int((np.bincount(label, weights=volumes) > 0.0).sum())
+
+
+@pytest.mark.parametrize(
+    "part", [p for p in catalogue().ids() if not is_approximate(definition(p))]
+)
+def test_a_part_is_one_body(part: str) -> None:
+    """Bodies that only touch would float apart in a solid model; overlapping ones are one."""
+    assert pieces(mesh(definition(part), "solid")) == 1
+
+
+@pytest.mark.parametrize(
+    "part", [p for p in catalogue().ids() if not is_approximate(definition(p))]
+)
+def test_mass_file_is_that_of_the_shapes(part: str) -> None:
+    """Fails when a shape has changed since: run `scripts/build_mass`."""
+    entry, solid = MASSES[part], mesh(definition(part), "solid").copy()
+    solid.density = material_of(definition(part)).density
+    assert entry["mass_kg"] == pytest.approx(solid.mass, rel=1e-4)
+    assert entry["centroid_m"] == pytest.approx(solid.center_mass, abs=1e-7)
+    scale = np.trace(solid.moment_inertia)
+    assert np.allclose(entry["inertia_kg_m2"], solid.moment_inertia, rtol=0.0, atol=1e-4 * scale)
+
+
+def test_two_bodies_and_a_hollow_one_are_told_apart() -> None:
+    ball, far = trimesh.creation.icosphere(1, 1.0), trimesh.creation.icosphere(1, 1.0)
+    far.apply_translation((3.0, 0.0, 0.0))
+    assert pieces(trimesh.util.concatenate([ball, far])) == 2
+    hollow = trimesh.creation.icosphere(1, 0.5)
+    hollow.invert()
+    assert pieces(trimesh.util.concatenate([ball, hollow])) == 1
+
+
+def test_the_page_names_every_simplified_part_and_no_other() -> None:
+    page = (HERE.parents[1] / "docs" / "shape_differences.md").read_text("utf-8")
+    lists = re.findall(r"^- (?:Flat-faced|Bodies of|Gears).*: (.+)\.$", page, re.MULTILINE)
+    assert len(lists) == 3
+    named = sorted(part for line in lists for part in line.split(", "))
+    assert named == sorted(p for p in catalogue().ids() if is_approximate(definition(p)))
+
+
+def test_only_parts_out_of_tolerance_are_listed_as_such() -> None:
+    for part in listed_differences():
+        percent = 100.0 * (
+            mesh(definition(part), "solid").volume * 1e9 / MEASURED["volume_mm3"][part] - 1.0
+        )
+        assert abs(percent) > 2.0
+
+
 @pytest.mark.parametrize("part", ["32524", "2780", "3705", "6536", "3701", "3648b"])
 def test_drawn_shape_is_closed_and_light(part: str) -> None:
     drawn, solid = mesh(definition(part)), mesh(definition(part), "solid")
@@ -98,7 +162,7 @@ def winding(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
     volume = np.einsum("pti,pti->pt", a, np.cross(b, c))
     ab, bc, ca = ((u * v).sum(-1) for u, v in ((a, b), (b, c), (c, a)))
     angle = 2.0 * np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb)
-    return np.rint(angle.sum(axis=1) / (4.0 * np.pi)).astype(int)
+    return np.asarray(np.rint(angle.sum(axis=1) / (4.0 * np.pi)), dtype=int)
 
 
 def test_bounds_of_a_liftarm_are_its_nominal_ones() -> None:
