@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Final
 
 import numpy as np
@@ -284,19 +284,28 @@ def _points(pieces: Iterable[Piece]) -> list[Feature]:
         PieceKind.SOCKET: PortKind.SOCKET,
     }
     out: list[Feature] = []
+    # baseplates have thousands of studs: only what lies in neighbouring cells is compared
+    cells: dict[tuple[int, ...], list[Feature]] = {}
     for piece in pieces:
         kind = kinds.get(piece.kind)
         if kind is None:
             continue
         feature = Feature(kind, piece.start, piece.end)
         round_ = kind in (PortKind.BALL, PortKind.SOCKET)
+        i, j, k = (int(x) for x in np.floor(feature.middle / JOIN))
+        near = (
+            other
+            for di, dj, dk in product((-1, 0, 1), repeat=3)
+            for other in cells.get((i + di, j + dj, k + dk), ())
+        )
         if not any(
             other.kind is kind
             and np.linalg.norm(other.middle - feature.middle) < JOIN
             and (round_ or abs(other.length - feature.length) < JOIN)
-            for other in out
+            for other in near
         ):
             out.append(feature)
+            cells.setdefault((i, j, k), []).append(feature)
     return out
 
 

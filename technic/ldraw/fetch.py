@@ -22,7 +22,7 @@ from typing import Any, Final
 
 from technic.errors import InputError, MissingDependency, UsageError
 from technic.folders import data_folder
-from technic.ldraw.storage import MAX_FILES, MAX_RATIO
+from technic.ldraw.storage import MAX_FILES, MAX_LIST, MAX_RATIO, list_size
 
 __all__ = ["DEFAULT_URL", "Fetched", "fetch", "library_target", "library_url"]
 
@@ -194,6 +194,9 @@ def _check(path: Path, url: str) -> None:
     """Refuse what is no parts library, before it takes the place of one."""
     remedy = "Check the address, or download complete.zip from ldraw.org by hand."
     try:
+        listed = list_size(path)
+        if listed > MAX_LIST:
+            raise InputError(f"its list of files has {listed} bytes: no parts library", path=url)
         with zipfile.ZipFile(path) as archive:
             infos = archive.infolist()
     except (zipfile.BadZipFile, EOFError, ValueError, NotImplementedError, OSError) as error:

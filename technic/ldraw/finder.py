@@ -168,7 +168,12 @@ class PartFinder:
                 library, number, shadow=self._shadow, solids=self._solids
             )
         except InputError as error:
-            self._refused[number] = f"its file in the parts library is unusable: {error.message}"
+            said = f"its file in the parts library is unusable: {error.message}"
+            if error.path is not None:
+                # what is wrong may stand in a subfile
+                place = str(error.path).removeprefix(f"{library.path}/")
+                said += f" ({place}" + (f", line {error.line})" if error.line else ")")
+            self._refused[number] = said
             return None
         key = f"parts/{number.lower().removesuffix('.dat')}.dat"
         if made is not None and not made.ports and self._embedded and key in self._embedded:

@@ -41,6 +41,9 @@ FOLDERS: Final = ("parts/", "p/", "models/", "unofficial/parts/", "unofficial/p/
 MAX_MOVES: Final = 16
 """Longest chain of moved-to stubs that is followed; real ones have at most three links."""
 
+MAX_REFERENCES: Final = 50_000
+"""Most type 1 lines of one file; the largest official ones have some thousand."""
+
 _DRIVE = re.compile(r"^[a-z]:")
 
 
@@ -324,6 +327,8 @@ def _parse(key: str, text: str, where: str) -> PartFile:
                 raise InputError(
                     error.message, path=where, line=number, remedy=error.remedy
                 ) from None
+            if len(references) == MAX_REFERENCES:
+                raise InputError(f"more than {MAX_REFERENCES} references", path=where, line=number)
             references.append(
                 Reference(
                     name, readonly(values[3:].reshape(3, 3)), readonly(values[:3]), inverted, number

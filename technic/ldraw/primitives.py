@@ -116,7 +116,7 @@ RADIUS_SLACK: Final = 0.25
 MAX_DEPTH: Final = 64
 """Deepest nesting of subfiles; real parts reach 7."""
 
-MAX_OCCURRENCES: Final = 50_000
+MAX_OCCURRENCES: Final = 10_000
 """Most primitives of interest in one part; the largest baseplates have 2,304 studs."""
 
 

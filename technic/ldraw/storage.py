@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import stat
 import struct
 import tempfile
 import zipfile
@@ -21,7 +22,7 @@ from typing import Final, Protocol
 from technic.errors import InputError
 from technic.folders import cache_folder
 
-__all__ = ["FolderStore", "Store", "ZipStore", "open_store"]
+__all__ = ["FolderStore", "Store", "ZipStore", "list_size", "open_store"]
 
 MAX_FILE: Final = 32 * 2**20
 """Largest file that is read (bytes); the largest official part has 3 MB."""
@@ -31,6 +32,9 @@ MAX_RATIO: Final = 200
 
 MAX_FILES: Final = 1_000_000
 """Largest number of files in a library; the full library has 45 thousand."""
+
+MAX_LIST: Final = 32 * 2**20
+"""Largest list of files in a zip (bytes); that of the full library has 5 MB."""
 
 _INDEX_VERSION: Final = "technic-library-index 3"
 _TOP: Final = ("p", "parts", "models", "unofficial")
@@ -73,7 +77,11 @@ def open_store(path: Path) -> Store:
         if path.is_file():
             return ZipStore(path)
     except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", path=path) from None
+        raise InputError(
+            f"cannot be read ({error.strerror})",
+            path=error.filename or path,
+            remedy="Check its permissions, or name another parts library with --library.",
+        ) from None
     raise InputError("there is no such file or folder", path=path)
 
 
@@ -193,12 +201,17 @@ class FolderStore:
         """Return the content of one file."""
         path = self.path / self._names[key]
         try:
-            size = path.stat().st_size
-            if size > MAX_FILE:
-                raise InputError(f"{size} bytes: larger than any part ({MAX_FILE})", path=path)
-            return path.read_bytes()
+            state = path.stat()
+            if not stat.S_ISREG(state.st_mode):  # a pipe would never end
+                raise InputError("this is no regular file", path=path)
+            if state.st_size <= MAX_FILE:
+                with open(path, "rb") as stream:
+                    data = stream.read(MAX_FILE + 1)
+                if len(data) <= MAX_FILE:
+                    return data
         except OSError as error:
             raise InputError(f"cannot be read ({error.strerror})", path=path) from None
+        raise InputError(f"{state.st_size} bytes: larger than any part ({MAX_FILE})", path=path)
 
     def release(self) -> str:
         """Return the newest release named by the files, e.g. ``"2026-02"``, or ``""``."""
@@ -232,6 +245,11 @@ class ZipStore:
 
     def _scan(self) -> None:
         try:
+            listed = list_size(self.path)
+            if listed > MAX_LIST:
+                raise InputError(
+                    f"its list of files has {listed} bytes: not a parts library", path=self.path
+                )
             with zipfile.ZipFile(self.path) as archive:
                 infos = archive.infolist()
         except (zipfile.BadZipFile, struct.error, EOFError, NotImplementedError) as error:
@@ -309,6 +327,29 @@ class ZipStore:
         return self._release
 
 
+def list_size(path: Path) -> int:
+    """Return the size of a zip's list of files (bytes), as its end states it; 0 when there is none.
+
+    `zipfile` reads the whole list into memory before it can be asked how long it is.
+    """
+    with open(path, "rb") as stream:
+        stream.seek(0, os.SEEK_END)
+        begin = max(0, stream.tell() - 2**16 - 128)  # the end record may have a comment behind it
+        stream.seek(begin)
+        tail = stream.read()
+        at = tail.rfind(b"PK\x05\x06")
+        if at < 0 or len(tail) < at + 22:
+            return 0
+        (size,) = struct.unpack_from("<L", tail, at + 12)
+        if size == 0xFFFFFFFF and at >= 20 and tail[at - 20 : at - 16] == b"PK\x06\x07":
+            (where,) = struct.unpack_from("<Q", tail, at - 12)
+            stream.seek(where)
+            record = stream.read(56)
+            if len(record) == 56:
+                (size,) = struct.unpack_from("<Q", record, 40)
+    return int(size)
+
+
 def _newest(store: Store, sample: int = 400) -> str:
     """Return the newest release among an even sample of the files.
 
@@ -317,6 +358,10 @@ def _newest(store: Store, sample: int = 400) -> str:
     keys = sorted(store.keys())
     newest = b""
     for key in keys[:: max(1, len(keys) // sample)]:
-        for match in _RELEASE.finditer(store.read(key)[:2000]):
+        try:
+            head = store.read(key)[:2000]
+        except InputError:
+            continue  # said when a model needs the file
+        for match in _RELEASE.finditer(head):
             newest = max(newest, match.group(1))
     return newest.decode()

@@ -22,6 +22,9 @@ __all__ = ["Surface", "SurfaceIntegrals", "surface_of"]
 MAX_TRIANGLES: Final = 500_000
 """Most triangles of one part; the largest official ones have about 200 thousand."""
 
+MAX_SIZE: Final = 10.0
+"""Largest extent of a part (m); a track of 48 studs has 0.4."""
+
 MAX_DEPTH: Final = 64
 
 _FINE: Final = "48/"
@@ -128,18 +131,24 @@ def surface_of(library: Library, number: str, *, fine: bool = True) -> Surface |
     Raises
     ------
     InputError
-        Broken files, a file that includes itself, or more than `MAX_TRIANGLES`.
+        Broken files, a file that includes itself, more than `MAX_TRIANGLES`, or a part larger than
+        `MAX_SIZE`.
     """
     resolved = library.resolve(number)
     if resolved is None:
         return None
-    flat = _flatten(library, resolved.key, fine, ())
-    triangles = flat.triangles @ resolved.matrix.T + resolved.offset
-    if np.linalg.det(resolved.matrix) < 0.0:
-        triangles = triangles[:, ::-1]
-    return Surface(
-        readonly(triangles * LDU), readonly(flat.certified, dtype=np.bool_), flat.missing
-    )
+    with np.errstate(over="ignore", invalid="ignore"):  # looked for below
+        flat = _flatten(library, resolved.key, fine, ())
+        triangles = flat.triangles @ resolved.matrix.T + resolved.offset
+        if np.linalg.det(resolved.matrix) < 0.0:
+            triangles = triangles[:, ::-1]
+        triangles = triangles * LDU
+        if not (np.abs(triangles) <= MAX_SIZE).all():
+            raise InputError(
+                f"it reaches further than {MAX_SIZE:g} m: no part does",
+                path=library.where(resolved.key),
+            )
+    return Surface(readonly(triangles), readonly(flat.certified, dtype=np.bool_), flat.missing)
 
 
 def _flatten(library: Library, key: str, fine: bool, trail: tuple[str, ...]) -> _Flat:

@@ -106,7 +106,9 @@ def _filled(surface: Surface) -> MassProperties | None:
         return None
     low, high = surface.bounds
     size = high - low
-    cube = max(CUBE, float(np.cbrt(np.prod(size + 2.0 * CUBE) / MOST_CUBES)))
+    cube = CUBE
+    while np.prod(size / cube + 4.0) > MOST_CUBES:
+        cube *= 1.1
     # a little off the faces, which lie on whole LDU, and off the middle between them
     origin = low - 1.4 * cube
     counts = np.ceil((high - origin) / cube).astype(int) + 2

@@ -56,6 +56,9 @@ DRAFT_FROM: Final = 1.2e-3
 MOST_CUBES: Final = 3_000_000
 """Sub-cubes of the box around a part, which the filling holds in memory at once (0.5 GB)."""
 
+_EVEN: Final = (PortKind.STUD, PortKind.TUBE, PortKind.STOP)
+"""Of these there are dozens on a plate, or they hold nothing: they do not count as connections."""
+
 _GROWTH: Final = 1.25
 _REMEMBERED: Final = 2048
 
@@ -82,7 +85,7 @@ def frame_ports(definition: PartDefinition) -> tuple[Port, ...]:
     held = [port for port in definition.ports if port.kind is not PortKind.STOP]
     if len(held) <= MOST_FRAMES:
         return tuple(held)
-    chosen = [k for k, p in enumerate(held) if p.kind not in (PortKind.STUD, PortKind.TUBE)]
+    chosen = [k for k, p in enumerate(held) if p.kind not in _EVEN]
     at = np.array([port.position for port in held])
     if not chosen:
         chosen = [int(np.argmax(np.linalg.norm(at - at.mean(axis=0), axis=1)))]
@@ -102,13 +105,12 @@ def _request(definition: PartDefinition) -> _Request | Refusal:
         return Refusal("it has no drawing")
     if definition.fastener:
         return Refusal("a pin or small connector: its give is in the joints")
+    holes = sum(port.kind not in _EVEN for port in definition.ports)
+    if holes > MOST_PORTS:
+        return Refusal(f"it has {holes} connections, more than the {MOST_PORTS} of a solid model")
     ports = frame_ports(definition)
     if len(ports) < 2:
         return Refusal("fewer than two connections to bend between")
-    if len(ports) > MOST_PORTS:
-        return Refusal(
-            f"it has {len(ports)} connections, more than the {MOST_PORTS} of a solid model"
-        )
     try:
         triangles = drawing.triangles()
     except InputError as fault:

@@ -227,7 +227,7 @@ def test_too_many_primitives_are_refused(ports):
     """Eight levels of eight references each would be 16 million holes."""
     levels = {f"l{n}": part(*[line(f"s/l{n + 1}.dat")] * 8) for n in range(7)}
     levels["l7"] = part(*[line("connhole.dat")] * 8)
-    with pytest.raises(InputError, match="more than 50000 primitives"):
+    with pytest.raises(InputError, match="more than 10000 primitives"):
         ports(line("s/l0.dat"), **levels)
 
 

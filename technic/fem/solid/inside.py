@@ -46,6 +46,10 @@ by the votes of the rays; the votes of single cubes then decide. Slivers of 0.1 
 MAX_CANDIDATES = 4_000_000
 """Triangle-ray pairs tested at once (memory: about 100 bytes each)."""
 
+MOST_CANDIDATES = 100_000_000
+"""Triangle-ray pairs of one direction (some ten seconds); a 5 x 11 frame in the finest setting has a fifth
+of it."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Filling:
@@ -110,7 +114,7 @@ def fill_fractions(
     Raises
     ------
     InputError
-        No triangles, or the grid does not enclose them.
+        No triangles, the grid does not enclose them, or they lie in too many layers.
     """
     if len(triangles) == 0:
         raise InputError("a solid needs a surface; there are no triangles")
@@ -254,6 +258,8 @@ def _intersect(
     low = np.ceil(plane.min(axis=1)).astype(np.int64)
     span = np.floor(plane.max(axis=1)).astype(np.int64) - low + 1
     counts = np.where(area == 0.0, 0, np.prod(np.maximum(span, 0), axis=1))
+    if float(counts.sum(dtype=float)) > MOST_CANDIDATES:
+        raise InputError("the surface is too large and too dense to be filled")
     start = 0
     while start < len(plane):
         running = np.cumsum(counts[start:])
