@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from technic.assembly.joint_types import MOTION_NAMES
+from technic.assembly.materials import material_rows
 from technic.assembly.model import Assembly, FindingKind, Joint, Part
 from technic.geometry import Array
 from technic.parts.definition import PortKind, outline
@@ -291,6 +292,7 @@ def _model(report: RigidityReport) -> dict[str, Any]:
         "dof": report.unknowns,
         "part_models": dict(report.part_models),
         "plain_parts": [plain.to_dict() for plain in report.plain_parts],
+        "materials": material_rows(assembly),
         "mass_kg": report.mass,
         "size_mm": size_mm(assembly),
         "unknown_parts": [

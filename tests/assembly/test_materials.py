@@ -145,3 +145,10 @@ def test_shapes_of_an_assembly_file() -> None:
     assert after.parts[0].mass_properties.mass > pair.parts[0].mass_properties.mass
     with pytest.raises(InputError, match="rigid shape"):
         made_of(pair, "c=PC")
+
+
+def test_report_says_what_parts_are_made_of_and_how_that_is_known(demo: Assembly) -> None:
+    rows = technic.analyze(made_of(demo, "41239=PC"), modes=1).to_dict()["model"]["materials"]
+    assert {row["name"] for row in rows} == {"ABS", "PC"}
+    assert sum(row["parts"] for row in rows) == len(demo.parts)
+    assert all(row["source"] and row["young_gpa"] > 0 for row in rows)
