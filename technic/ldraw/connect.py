@@ -22,7 +22,7 @@ from technic.geometry import Array, axes_from, readonly
 from technic.ldraw.findings import find
 from technic.ldraw.matching import Limits, Matched, Mating, match
 from technic.ldraw.placed import PlacedPorts, collect
-from technic.ldraw.seats import Seat, seats
+from technic.ldraw.seats import HINGE, Seat, seats
 from technic.ldraw.stops import missing_stops
 
 __all__ = ["AxleSlide", "Links", "connect", "findings_of", "link"]
@@ -113,6 +113,8 @@ def link(
         by_pair.setdefault(pair, []).append(joint)
         ports[joint_id] = tuple(port for k in group for port in matched.matings[k].ports)
     for seat in seats(parts, limits):
+        if seat.connection == HINGE and seat.parts in by_pair:
+            continue  # the catalogue describes its knuckles as a pin and its hole
         number = len(by_pair.get(seat.parts, [])) + 1
         joint_id = f"{parts[seat.parts[0]].id}~{parts[seat.parts[1]].id}@{number}"
         by_pair.setdefault(seat.parts, []).append(_seat(seat, table, joint_id))

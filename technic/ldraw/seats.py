@@ -1,5 +1,6 @@
 """Parts that belong to each other without a connector: tyres on rims, the two halves of a turntable,
-planet gears in a differential, driving rings on their joiners and in the gears that they drive.
+planet gears in a differential, driving rings on their joiners and in the gears that they drive,
+the halves of hinges.
 
 None of them has a pin, an axle or a stud for it. They are recognised by what they are (family or LDraw
 title) and by lying on one line at one place.
@@ -15,16 +16,18 @@ import numpy as np
 
 from technic.assembly.model import Finding, FindingKind, Part
 from technic.geometry import Array
+from technic.ldraw.hinges import knuckles_in_place
 from technic.ldraw.matching import Limits
 from technic.parts.definition import PortKind
 from technic.units import LDU, PITCH
 
-__all__ = ["DOGS", "PLANET", "RING", "TURNTABLE", "TYRE", "Seat", "seats", "tyre_findings"]
+__all__ = ["DOGS", "HINGE", "PLANET", "RING", "TURNTABLE", "TYRE", "Seat", "seats", "tyre_findings"]
 
 TYRE = "tyre/rim"
 TURNTABLE = "turntable/turntable"
 PLANET = "planet/differential"
 RING = "driving ring/joiner"
+HINGE = "hinge/hinge"
 DOGS = "driving ring/clutch"
 
 PLANET_REACH = PITCH
@@ -101,6 +104,10 @@ def seats(parts: Sequence[Part], limits: Limits) -> list[Seat]:
             found.append(best)
     found += _planets(parts, limits)
     found += _driving(parts, limits)
+    found += [
+        Seat(HINGE, hinge.parts, hinge.point, hinge.axis, hinge.offset)
+        for hinge in knuckles_in_place(parts, limits)
+    ]
     return sorted(found, key=lambda seat: seat.parts)
 
 

@@ -12,11 +12,11 @@ from technic.assembly.stiffness import MOTIONS, default_table, read_table
 from technic.errors import InputError, SchemaError, UsageError
 from technic.ldraw.gears import CONNECTION as GEARS
 from technic.ldraw.matching import MATES
-from technic.ldraw.seats import DOGS, PLANET, RING, TURNTABLE, TYRE
+from technic.ldraw.seats import DOGS, HINGE, PLANET, RING, TURNTABLE, TYRE
 
 
 def test_every_connection_has_an_entry():
-    known = {*MATES.values(), TYRE, TURNTABLE, PLANET, RING, DOGS, GEARS}
+    known = {*MATES.values(), TYRE, TURNTABLE, PLANET, RING, DOGS, HINGE, GEARS}
     assert known == set(default_table().connections)
 
 

@@ -157,3 +157,39 @@ def test_a_ring_elsewhere_drives_nothing():
         "76244", "Gear 24 Tooth Clutch", [port("hole", "axle_hole", [0, 0, 0], Z, 20)]
     )
     assert joints_of([place(ring(), (0, 0, 0)), place(slipping, (0, 0, 20))]) == ()
+
+
+# --- hinges ---------------------------------------------------------------------------------------
+def half_hinge(number, title="Hinge"):
+    """Return a half without connectors."""
+    return define(number, title, [])
+
+
+@pytest.mark.parametrize("top", ["3938", "6134"])
+@pytest.mark.parametrize("angle", [0, 35, 90])
+def test_a_hinge_brick_turns_about_its_knuckles(top, angle):
+    knuckle = np.array([0, 10, 0])
+    turned = rotation([1, 0, 0], angle)
+    base = place(half_hinge("3937"), (0, 0, 0))
+    parts = [base, place(half_hinge(top), knuckle - turned @ knuckle, turned)]
+    (joint,) = joints_of(parts)
+    assert joint.type is JointType.HINGE
+    assert joint.connection == "hinge/hinge"
+    np.testing.assert_allclose(joint.point / LDU, knuckle, atol=1e-9)
+    np.testing.assert_allclose(np.abs(joint.axes[0]), [1, 0, 0], atol=1e-9)
+    shifted = [base, place(half_hinge(top), knuckle - turned @ knuckle + [20, 0, 0], turned)]
+    assert not joints_of(shifted)
+
+
+def test_click_hinges_take_a_finger_between_two():
+    bucket, arm = half_hinge("30394"), half_hinge("30552")
+    (joint,) = joints_of([place(arm, (0, 0, 0)), place(bucket, (0, 0, -10))])
+    assert joint.connection == "hinge/hinge"
+    assert not joints_of([place(arm, (0, 0, 0)), place(arm, (0, 0, 0))])
+    assert not joints_of([place(arm, (0, 0, 0)), place(half_hinge("3937"), (0, -10, -10))])
+
+
+def test_each_half_is_in_one_hinge():
+    bases = [place(half_hinge("3937"), (x, 0, 0)) for x in (0, 1)]
+    tops = [place(half_hinge("3938"), (x, 0, 0)) for x in (0, 1)]
+    assert sorted(j.parts for j in joints_of([*bases, *tops])) == [(0, 2), (1, 3)]
