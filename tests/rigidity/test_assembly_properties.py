@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from technic.assembly.builder import Linkage
+from technic.assembly.file import build_assembly
 from technic.assembly.joint_types import JointType
 from technic.assembly.model import Assembly
+from technic.assembly.writing import to_document
 from technic.geometry import Pose
 from technic.rigidity.analyze import analyze
 from technic.system.assemble import assemble
@@ -95,9 +97,6 @@ def test_a_longer_unit_of_length_scales_the_rigidity(seed, dimension):
     # all lengths times s with the same material: every stiffness times s, rotations times s^3
     scale = 7.0
     model = linkage(seed, dimension)
-    from technic.assembly.file import build_assembly
-    from technic.assembly.writing import to_document
-
     data = to_document(model)
     for part in data["parts"]:
         shape = part["shape"]
@@ -132,6 +131,19 @@ def test_a_joint_more_never_softens_and_never_adds_a_motion(seed, dimension):
     # a joint that ties two pieces together turns a rigid motion of one piece into one of the whole
     totals = [m.total + free * c for m, c in zip(mobility, components, strict=True)]
     assert totals[0] <= totals[1]
+
+
+@settings(max_examples=15)
+@given(seed=SEEDS, dimension=DIMENSIONS, play=st.floats(1e-6, 1e-3))
+def test_play_never_stiffens_and_moves_nothing(seed, dimension, play):
+    model = linkage(seed, dimension)
+    data = to_document(model)
+    for row in data["joints"]:
+        row["jitter"] = {"shear": play, "axial": play, "spin": 10 * play, "tilt": 10 * play}
+    tight, loose = analyze(model, modes=1), analyze(build_assembly(data), modes=1)
+    assert loose.mobility == tight.mobility
+    if value(tight) is not None:
+        assert value(loose) < value(tight) * (1 + 1e-9)
 
 
 @settings(max_examples=10)
