@@ -45,8 +45,15 @@ BEAM, PITCH = 15, 20
 """Holes of the lattice's beams; LDU from hole to hole."""
 
 
+def _shift(line: int) -> int:
+    """Return by how many holes the beams of a line are shifted."""
+    return 8 if line // 2 % 2 else 0
+
+
 def lattice(rows: int, columns: int, folder: Path) -> Assembly:
     """Return beams of 15 in two layers that cross at every second hole, a pin at each crossing.
+
+    Every second line of beams is shifted by half a beam, so that all hang together.
 
     Parameters
     ----------
@@ -60,15 +67,16 @@ def lattice(rows: int, columns: int, folder: Path) -> Assembly:
     half = (BEAM - 1) / 2
     for z in range(0, along, 2):
         for k in range(rows):
-            x = PITCH * (BEAM * k + half)
+            x = PITCH * (BEAM * k + half + _shift(z))
             lines.append(f"1 4 {x:g} 0 {PITCH * z} 0 0 1 0 1 0 -1 0 0 32278.dat")
     for x in range(0, across, 2):
         for k in range(columns):
-            z = PITCH * (BEAM * k + half)
+            z = PITCH * (BEAM * k + half + _shift(x))
             lines.append(f"1 14 {PITCH * x} -20 {z:g} 1 0 0 0 1 0 0 0 1 32278.dat")
     for x in range(0, across, 2):
         for z in range(0, along, 2):
-            lines.append(f"1 0 {PITCH * x} -10 {PITCH * z} 0 1 0 1 0 0 0 0 1 2780.dat")
+            if x >= _shift(z) and z >= _shift(x):
+                lines.append(f"1 0 {PITCH * x} -10 {PITCH * z} 0 1 0 1 0 0 0 0 1 2780.dat")
     path = folder / "lattice.ldr"
     path.write_text("\n".join([*lines, ""]), encoding="utf-8")
     return load(path)

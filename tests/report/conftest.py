@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ import pytest
 
 import technic
 from technic.rigidity.result import RigidityReport
+from tests.conftest import IN_CI
+from tests.report.browsing import FLAGS
 
 BEAM = "1 4 0 {y} {z} 1 0 0 0 1 0 0 0 1 32316.dat"
 PIN = "1 0 0 -10 {z} 0 1 0 1 0 0 0 0 1 2780.dat"
@@ -60,3 +63,18 @@ def scissors(make_report: Callable[..., RigidityReport]) -> RigidityReport:
 def models() -> dict[str, list[str]]:
     """Lines of the small models by name."""
     return {"pair": PAIR, "scissors": SCISSORS}
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """Debian's Chromium without a window."""
+    sync_api = pytest.importorskip("playwright.sync_api")
+    program = shutil.which("chromium") or shutil.which("chromium-browser")
+    if program is None:
+        if IN_CI:
+            pytest.fail("no chromium; scripts/test installs it")
+        pytest.skip("no chromium")
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=FLAGS)
+        yield browser
+        browser.close()

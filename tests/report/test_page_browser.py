@@ -2,78 +2,21 @@
 
 from __future__ import annotations
 
-import io
-import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 import technic
 from technic.assembly.model import Assembly, Source
 from technic.report.html.page import page, write_page
 from technic.rigidity.result import RigidityReport
-from tests.conftest import IN_CI, REPO
-
-sync_api = pytest.importorskip("playwright.sync_api")
+from tests.conftest import REPO
+from tests.report.browsing import Visit, differ, near
 
 pytestmark = pytest.mark.slow
-
-FLAGS = [
-    "--no-sandbox",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-    # Draw without a graphics card.
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator:
-    """Debian's Chromium without a window."""
-    program = shutil.which("chromium") or shutil.which("chromium-browser")
-    if program is None:
-        if IN_CI:
-            pytest.fail("no chromium; scripts/test installs it")
-        pytest.skip("no chromium")
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=FLAGS)
-        yield browser
-        browser.close()
-
-
-class Visit:
-    """An open page with everything that it said and asked for."""
-
-    def __init__(self, browser, path: Path, **context) -> None:
-        context = {"viewport": {"width": 1000, "height": 900}, "reduced_motion": "reduce"} | context
-        self.context = browser.new_context(**context)
-        self.page = self.context.new_page()
-        self.page.set_default_timeout(20_000)
-        self.said: list[str] = []
-        self.asked: list[str] = []
-        self.page.on("console", lambda message: self.said.append(message.text))
-        self.page.on("pageerror", lambda error: self.said.append(str(error)))
-        self.page.on("request", lambda request: self.asked.append(request.url))
-        self.address = path.as_uri()
-        self.page.goto(self.address)
-        self.page.wait_for_selector("#viewer.live #canvas[data-drawn]")
-
-    def canvas(self) -> np.ndarray:
-        """Pixels of the model, (height, width, 3), two frames after now."""
-        self.page.evaluate(
-            "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
-        )
-        picture = self.page.locator("#canvas").screenshot()
-        # Without the stage's border.
-        return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB")).astype(int)[4:-4, 4:-4]
 
 
 @pytest.fixture(scope="module")
@@ -94,16 +37,6 @@ def visit(browser, tmp_path: Path) -> Iterator[Callable[..., Visit]]:
     yield open_page
     for visit in visits:
         visit.context.close()
-
-
-def differ(one: np.ndarray, other: np.ndarray) -> int:
-    """Pixels that differ clearly."""
-    return int((np.abs(one - other).max(axis=2) > 30).sum())
-
-
-def near(pixels: np.ndarray, color: tuple[int, int, int], within: int = 45) -> int:
-    """Pixels near a colour."""
-    return int((np.abs(pixels - np.array(color)).max(axis=2) < within).sum())
 
 
 def test_loads_without_complaint_or_request(visit, chassis: RigidityReport) -> None:
@@ -165,6 +98,14 @@ def test_play_goes_on_and_stops(visit, pair: RigidityReport) -> None:
     assert button.text_content() == "Play"
 
 
+def click(seen: Visit, across: float, down: float) -> None:
+    """Click into the model, at shares of its width and height."""
+    canvas = seen.page.locator("#canvas")
+    canvas.scroll_into_view_if_needed()
+    box = canvas.bounding_box()
+    canvas.click(position={"x": across * box["width"], "y": down * box["height"]})
+
+
 def test_row_flies_and_click_chooses(visit, chassis: RigidityReport) -> None:
     seen = visit(chassis)
     before = seen.canvas()
@@ -185,15 +126,14 @@ def test_row_flies_and_click_chooses(visit, chassis: RigidityReport) -> None:
     seen.page.locator("#info-close").click()
     assert not info.is_visible()
     # The spot is in the middle now: what lies there can be chosen with the mouse.
-    box = seen.page.locator("#canvas").bounding_box()
     seen.page.locator("#show-marks").uncheck()
-    seen.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    click(seen, 0.5, 0.5)
     assert info.is_visible()
     names = {part.name for part in chassis.assembly.parts}
     assert seen.page.locator("#info-name").text_content() in names
     # Beside the model there is nothing to choose.
     seen.page.locator("button[data-view=front]").click()
-    seen.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] - 4)
+    click(seen, 0.97, 0.5)
     assert not info.is_visible()
 
 
@@ -238,6 +178,97 @@ def test_motion_plays_in_green(visit, scissors: RigidityReport) -> None:
     pixels = seen.canvas()
     green = (pixels[:, :, 1] > pixels[:, :, 0] + 60) & (pixels[:, :, 1] > pixels[:, :, 2] + 40)
     assert green.sum() > 1000
+
+
+def test_every_mode_bends_and_can_be_chosen(visit, chassis: RigidityReport) -> None:
+    seen = visit(chassis)
+    options = seen.page.locator("#what option")
+    words = [options.nth(k).text_content() for k in range(options.count())]
+    modes = [said for said in words if said.startswith(("Worst case", "Mode "))]
+    assert len(modes) == len(chassis.modes) > 3
+    assert not any("rigid" in said for said in words)
+    pictures = []
+    for k in range(3):
+        seen.page.locator("#what").select_option(f"mode {k}")
+        pictures.append(seen.canvas())
+    assert differ(pictures[0], pictures[1]) > 2000
+    assert differ(pictures[1], pictures[2]) > 2000
+    # Arrows and weak spots belong to the worst case alone.
+    assert not seen.page.locator("#load-key").is_visible()
+    seen.page.locator("#what").select_option("mode 0")
+    assert seen.page.locator("#load-key").is_visible()
+
+
+def test_marks_of_weak_spots_do_not_overlap(visit, chassis: RigidityReport) -> None:
+    seen = visit(chassis)
+    for view in ("best", "front", "side", "top"):
+        seen.page.locator(f"button[data-view={view}]").click()
+        seen.canvas()
+        boxes = seen.page.evaluate(
+            """() => [...document.querySelectorAll('.mark')].filter((m) => !m.hidden).map((m) => {
+              const box = m.getBoundingClientRect();
+              return [box.left, box.top, box.right, box.bottom];
+            })"""
+        )
+        assert len(boxes) >= 2
+        for k, a in enumerate(boxes):
+            for b in boxes[k + 1 :]:
+                apart = a[2] <= b[0] + 1 or b[2] <= a[0] + 1 or a[3] <= b[1] + 1 or b[3] <= a[1] + 1
+                assert apart
+
+
+def test_clear_parts_show_what_is_behind(visit, make_report) -> None:
+    lines = ["1 4 0 0 0 1 0 0 0 1 0 0 0 1 32316.dat", "1 {} 60 0 0 1 0 0 0 1 0 0 0 1 32316.dat"]
+    opaque, clear = (make_report([lines[0], lines[1].format(code)], f"c{code}") for code in (1, 47))
+    red = []
+    for report in (opaque, clear):
+        seen = visit(report)
+        seen.page.locator("button[data-view=side]").click()  # the second beam hides the first
+        seen.page.locator("#show-edges").uncheck()
+        pixels = seen.canvas()
+        red.append(int((pixels[:, :, 0] > pixels[:, :, 2] + 5).sum()))
+    assert red[1] > 2000
+    assert red[1] > 5 * red[0]
+
+
+def test_assembly_stands_upright(visit) -> None:
+    """The rack's feet are below, its shelf above: z is up in the file."""
+    path = REPO / "technic" / "data" / "gallery" / "fig14c_drying_rack_3.json"
+    report = technic.analyze(technic.load(path))
+    seen = visit(report)
+    seen.page.locator("#show-load").uncheck()
+    seen.page.locator("#show-marks").uncheck()
+    seen.page.locator("#what").select_option("none")
+    for view in ("front", "best"):
+        seen.page.locator(f"button[data-view={view}]").click()
+        ink = np.abs(seen.canvas() - seen.canvas()[5, 5]).max(axis=2) > 60
+        rows = np.flatnonzero(ink.any(axis=1))
+        upper, lower = (ink[rows[0] : rows[0] + 30].sum(), ink[rows[-1] - 30 : rows[-1]].sum())
+        assert upper > 1.5 * lower  # the shelf's frame against four feet
+
+
+def test_calibration_has_its_plots(visit, model_with_calibration) -> None:
+    seen = visit(model_with_calibration)
+    plot = seen.page.locator("svg.plot").first
+    assert plot.is_visible()
+    assert plot.locator("circle.dot").count() >= 1
+    words = " ".join(plot.locator("text").all_text_contents())
+    assert "pin/pin_hole" in words
+    assert "N/m" in words
+    assert seen.said == []
+
+
+@pytest.fixture
+def model_with_calibration(tmp_path: Path) -> RigidityReport:
+    from technic.assembly.stiffness import read_table
+    from technic.report.calibration import calibration_toml
+    from technic.statics.calibration import calibrate
+
+    sample = REPO / "calibration" / "samples" / "pins_synthetic.csv"
+    table = tmp_path / "pins.toml"
+    table.write_text(calibration_toml(calibrate(sample), "2026-11-22"), encoding="utf-8")
+    path = REPO / "technic" / "data" / "rolling_chassis.mpd"
+    return technic.analyze(technic.load(path, table=read_table(table)), table=read_table(table))
 
 
 def test_arrows_are_over_the_parts(visit, pair: RigidityReport) -> None:
@@ -316,8 +347,22 @@ def test_print_layout_has_the_tables_and_a_view(visit, chassis: RigidityReport) 
     seen = visit(chassis)
     seen.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     seen.page.emulate_media(media="print")
-    for wanted in ("#weak-spots", "#motions", "#findings", "#stiffness", "#not-modelled"):
+    sections = (
+        "#weak-spots",
+        "#motions",
+        "#findings",
+        "#stiffness",
+        "#parts-made",
+        "#not-modelled",
+    )
+    for wanted in sections:
         assert seen.page.locator(wanted).is_visible()
+    tables = seen.page.locator("table:not(#part-list table)")
+    assert tables.count() >= 3
+    for k in range(tables.count()):
+        assert tables.nth(k).is_visible()
+        # Nothing is cut off at the edge of the paper.
+        assert tables.nth(k).evaluate("(table) => table.scrollWidth <= innerWidth")
     assert seen.page.locator("#weak-spots tbody tr").count() == 40
     assert not seen.page.locator("#controls").is_visible()
     picture = seen.page.locator("#snapshot")
