@@ -13,7 +13,7 @@ from technic.report.drawing import (
     deformation_scale,
     deformed_points,
     drawing_of,
-    furthest_way,
+    worst_way,
 )
 from technic.report.load_arrows import LOAD_COLOR, load_arrows
 from technic.report.palette import NEUTRAL
@@ -33,7 +33,7 @@ def common_scale(reports: Sequence[RigidityReport], drawings: Sequence[Drawing])
     scales = []
     for report, drawing in zip(reports, drawings, strict=True):
         load = unit_load(report)
-        furthest = 0.0 if load is None else furthest_way(report, drawing, load[1])
+        furthest = 0.0 if load is None else worst_way(report, drawing, load[1])
         if furthest > 0.0:
             scales.append(deformation_scale(report, drawing, furthest))
     return min(scales, default=0.0)
@@ -49,7 +49,7 @@ def _layers(
     moved = deformed_points(report, drawing, load[1], scale)
     body, edges = model_layers(drawing, moved)
     arrows, _ = load_arrows(report, drawing, field, scale, strongest)
-    furthest = furthest_way(report, drawing, load[1]) / MM
+    furthest = worst_way(report, drawing, load[1]) / MM
     surfaces = body if arrows is None else (*body, arrows)
     return surfaces, edges, f"; 1 N moves the furthest point {number(furthest)} mm"
 

@@ -19,6 +19,7 @@ __all__ = [
     "drawing_of",
     "furthest_way",
     "nice",
+    "worst_way",
 ]
 
 DEFORMED_SHARE = 0.07
@@ -79,13 +80,31 @@ def deformed_points(
 
 
 def furthest_way(report: RigidityReport, drawing: Drawing, twists: Array) -> float:
-    """Return how far the furthest point goes at 1 N (m), to first order."""
+    """Return how far the furthest point goes with rigid parts (m), to first order."""
     best = 0.0
     for k, (part, where) in enumerate(zip(report.assembly.parts, drawing.points, strict=True)):
         arms = where - part.centroid
         way = twists[k, :3] + np.cross(twists[k, 3:], arms)
         best = max(best, float(np.linalg.norm(way, axis=1).max()))
     return best
+
+
+def worst_way(report: RigidityReport, drawing: Drawing, twists: Array) -> float:
+    """Return how far the furthest point goes in the worst mode at 1 N (m), bending included.
+
+    A part may do nothing but bend; then its twist is zero up to rounding.
+
+    Parameters
+    ----------
+    report : RigidityReport
+        With an elastic mode.
+    drawing : Drawing
+    twists : (p, 6) ndarray
+        Rigid part of the movement of each part at 1 N.
+    """
+    ways = [np.linalg.norm(way, axis=1).max() for way in report.node_displacements.values()]
+    bent = float(max(ways, default=0.0)) / report.modes[0].value
+    return max(bent, furthest_way(report, drawing, twists))
 
 
 def deformation_scale(report: RigidityReport, drawing: Drawing, furthest: float) -> float:

@@ -18,6 +18,7 @@ from technic.report.drawing import (
     deformed_points,
     drawing_of,
     furthest_way,
+    worst_way,
 )
 from technic.report.motion_picture import MOTION_COLOR
 from technic.report.palette import NEUTRAL
@@ -42,7 +43,7 @@ Poses = Callable[[float], tuple[Array, ...]]
 
 def _mode(report: RigidityReport, drawing: Drawing) -> tuple[Poses, LegendItem] | None:
     load = unit_load(report)
-    furthest = 0.0 if load is None else furthest_way(report, drawing, load[1])
+    furthest = 0.0 if load is None else worst_way(report, drawing, load[1])
     if load is None or furthest == 0.0:
         return None
     twists = load[1]

@@ -24,7 +24,7 @@ from technic.report.drawing import (
     deformation_scale,
     deformed_points,
     drawing_of,
-    furthest_way,
+    worst_way,
 )
 from technic.report.energy import energy_shares
 from technic.report.files import write_bytes
@@ -105,7 +105,7 @@ def _matrix(turn: Array, rotation: Array, translation: Array) -> list[float]:
 def _moved(report: RigidityReport, drawing: Drawing) -> tuple[float, Sequence[Array]]:
     """Return the scale of the deformation and the deformed points of each part; 0 for none."""
     load = unit_load(report)
-    furthest = 0.0 if load is None else furthest_way(report, drawing, load[1])
+    furthest = 0.0 if load is None else worst_way(report, drawing, load[1])
     if load is None or furthest == 0.0:
         return 0.0, ()
     scale = deformation_scale(report, drawing, furthest)

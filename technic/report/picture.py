@@ -20,7 +20,7 @@ from technic.report.drawing import (
     deformation_scale,
     deformed_points,
     drawing_of,
-    furthest_way,
+    worst_way,
 )
 from technic.report.load_arrows import LOAD_COLOR, load_arrows
 from technic.report.motion_picture import MOTION_COLOR, motion_layers
@@ -156,7 +156,7 @@ def _elastic_panel(
     if load is None:
         return None
     _, twists = load
-    furthest = furthest_way(report, drawing, twists)
+    furthest = worst_way(report, drawing, twists)
     if furthest == 0.0:
         return None
     scale = deformation_scale(report, drawing, furthest)

@@ -321,3 +321,14 @@ def test_pins_go_along_with_what_they_hold(model: Callable[[str], Path]) -> None
             for k in joint.parts
         )
         assert np.allclose(one, other, atol=1e-6)
+
+
+def test_part_that_only_bends_is_drawn_bent(make_report: Callable[..., RigidityReport]) -> None:
+    """One beam alone: its twist is zero up to rounding, the factor is not infinite for that."""
+    report = make_report(["1 4 0 0 0 1 0 0 0 1 0 0 0 1 32316.dat"], "alone", parts="frame")
+    drawing = drawing_of(report.assembly)
+    shapes = shapes_of(report.assembly.parts, drawing.solids)
+    worst = mode_fields(report, drawing, shapes)[0]
+    furthest = max(np.linalg.norm(way, axis=1).max() for way in report.node_displacements.values())
+    drawn = worst.scale * furthest / report.modes[0].value
+    assert 0.02 * drawing.diagonal < drawn < 0.1 * drawing.diagonal

@@ -99,7 +99,8 @@ def mode_fields(report: RigidityReport, drawing: Drawing, shapes: Shapes) -> lis
         if mode.value <= 0.0:
             continue
         twists = np.asarray(mode.twists) / mode.value
-        furthest = _furthest(drawing, shapes, twists)
+        bent = (np.linalg.norm(way, axis=1).max() for way in mode.displacements.values())
+        furthest = max(_furthest(drawing, shapes, twists), max(bent, default=0.0) / mode.value)
         if furthest == 0.0:
             continue
         scale = deformation_scale(report, drawing, furthest)
