@@ -6,7 +6,6 @@ from collections import Counter
 
 import numpy as np
 
-from technic.assembly.joint_types import JointType
 from technic.assembly.model import Assembly, FindingKind, Part
 from technic.geometry import Array, cross
 from technic.parts.definition import PortKind
@@ -17,6 +16,9 @@ from technic.tolerances import MOBILITY_LENGTH, MOTION_KIND_CUT, SAME_LINE
 from technic.units import MM
 
 __all__ = ["import_effects", "motion_sentence", "not_modelled", "part_label", "reason"]
+
+_TEETH = "gear/gear"
+"""Connection of two gears in mesh; threads inside of actuators are meshes, too."""
 
 GROUPS_SHOWN = 4
 """A sentence names at most this many bodies and parts; the report lists all."""
@@ -237,7 +239,7 @@ def not_modelled(assembly: Assembly) -> tuple[str, ...]:
     flexible = sum(f.kind is FindingKind.FLEXIBLE for f in assembly.findings)
     if flexible:
         out.append(f"{flexible} flexible {'item' if flexible == 1 else 'items'}")
-    meshed = any(joint.type is JointType.MESH for joint in assembly.joints)
+    meshed = any(joint.connection == _TEETH for joint in assembly.joints)
     geared = any("gear" in (p.definition.family if p.definition else "") for p in assembly.parts)
     if geared and not meshed:
         pairs = sum(f.kind is FindingKind.GEARS for f in assembly.findings)
