@@ -19,6 +19,7 @@ __all__ = [
     "axes_from",
     "cross",
     "nearest_orthogonal",
+    "plane_axes",
     "readonly",
     "rotation_matrix",
     "rotation_vector",
@@ -127,6 +128,36 @@ def axes_from(axis: ArrayLike) -> Array:
     b = np.cross(a, helper)
     b /= np.linalg.norm(b)
     return np.array([a, b, np.cross(a, b)])
+
+
+def plane_axes(outline: Array) -> Array:
+    """Return a right-handed orthonormal frame whose third row is the normal of a polygon in space.
+
+    The first is the direction of its first edge, so that the frame moves along with the polygon.
+
+    Parameters
+    ----------
+    outline : (n, 3) ndarray
+        Corners in order; about a flat polygon's normal they go round to the left.
+
+    Returns
+    -------
+    (3, 3) ndarray
+
+    Raises
+    ------
+    ValueError
+        The polygon has no area.
+    """
+    arms = outline - outline.mean(axis=0)
+    normal = cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0)
+    if np.linalg.norm(normal) <= 1e-12 * float(np.ptp(outline, axis=0).max()) ** 2:
+        raise ValueError("the polygon has no area")
+    normal = normal / np.linalg.norm(normal)
+    edge = outline[1] - outline[0]
+    first = edge - (edge @ normal) * normal
+    first = first / np.linalg.norm(first)
+    return np.array([first, cross(normal, first), normal])
 
 
 def nearest_orthogonal(matrix: ArrayLike) -> Array:

@@ -105,7 +105,7 @@ class Linkage:
         material: str | None = None,
         **options: Any,
     ) -> None:
-        """Add a plate with a polygon as outline (two dimensions)."""
+        """Add a flat plate with a polygon as outline."""
         shape = {"kind": "polygon", "points": _points(points), "thickness": thickness, **options}
         self._part(name, shape, material)
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from technic.errors import InputError
-from technic.geometry import Array
+from technic.geometry import Array, plane_axes
 from technic.parts.definition import (
     Body,
     FrameBody,
@@ -41,6 +41,12 @@ then comes out within 1 %."""
 PLATE_DIVISIONS: Final = 10
 """A plate is divided into triangles with edges of this share of its longest side's box, unless the file
 says otherwise."""
+
+SLAB_DIVISIONS: Final = 6
+"""The same in space, where each triangle becomes three tetrahedra of ten nodes."""
+
+FLAT: Final = 1e-6
+"""Corners of a plate may leave its plane by this share of its size: coordinates in files are rounded."""
 
 
 class ShapeFault(Exception):
@@ -255,21 +261,31 @@ def _polygon(
     _joint_points: Sequence[Array],
     _folder: Path,
 ) -> Made:
-    """Make a plate that deforms in its plane."""
-    if dimension != 2:
-        raise ShapeFault(".kind", "a polygon is a plate of a two-dimensional assembly")
+    """Make a plate: in two dimensions it deforms in its plane, in space it bends, too."""
     outline = as_points(shape["points"], dimension, ".points")
     _stretches(np.vstack([outline, outline[:1]]))
+    axes, middle, flat = np.eye(3), np.zeros(3), outline
+    box = float(np.ptp(outline, axis=0).max())
+    if dimension == 3:
+        try:
+            axes, middle = plane_axes(outline), outline.mean(axis=0)
+        except ValueError as error:
+            raise ShapeFault(".points", "encloses no area") from error
+        flat = (outline - middle) @ axes.T
+        off = np.abs(flat[:, 2])
+        if off.max() > FLAT * box:
+            raise ShapeFault(f".points[{int(off.argmax())}]", "leaves the plane of the others")
     # a fan of triangles with signs: right for any simple polygon
     fan = np.array([[0, k, k + 1] for k in range(1, len(outline) - 1)])
-    box = float(np.ptp(outline, axis=0).max())
-    size = float(shape.get("size", box / PLATE_DIVISIONS))
-    body = PlateBody(outline, float(shape["thickness"]), material, size)
+    divisions = PLATE_DIVISIONS if dimension == 2 else SLAB_DIVISIONS
+    size = float(shape.get("size", box / divisions))
+    body = PlateBody(outline, float(shape["thickness"]), material, size, dimension == 3)
     try:
-        properties = simplex_mass(outline, fan, body.thickness, material)
+        mass = simplex_mass(flat, fan, body.thickness, material)
     except InputError as error:
         raise ShapeFault(".points", error.message) from error
-    return Made(body, properties)
+    inertia = axes.T @ mass.inertia @ axes
+    return Made(body, MassProperties(mass.mass, mass.centroid @ axes + middle, inertia))
 
 
 def simplex_mass(

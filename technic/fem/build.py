@@ -61,6 +61,8 @@ def build_element(body: Body, properties: MassProperties, attachments: Array) ->
 
 @lru_cache(maxsize=64)
 def _divided(body: PlateBody) -> tuple[Array, NDArray[np.int64]]:
-    from technic.fem.plate import divide
+    from technic.fem.plate import divide, slab
 
+    if body.spatial:
+        return slab(body.outline, body.thickness, body.size)
     return divide(body.outline, body.size)

@@ -1,4 +1,4 @@
-"""Plates in the plane: a simple polygon divided into triangles."""
+"""Plates: a simple polygon divided into triangles, in space into tetrahedra."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from technic.errors import InputError
-from technic.geometry import Array
+from technic.geometry import Array, plane_axes
 
-__all__ = ["divide", "inside"]
+__all__ = ["divide", "inside", "slab"]
 
 ROUNDS = 5
 """How often the edge length is halved until the triangles follow the outline."""
@@ -60,6 +60,46 @@ def divide(outline: Array, size: float) -> tuple[Array, NDArray[np.int64]]:
             return flat, cells.reshape(-1, 3).astype(np.int64)
         size /= 2.0
     raise InputError("the polygon crosses itself, or is too narrow to be divided into triangles")
+
+
+def slab(outline: Array, thickness: float, size: float) -> tuple[Array, NDArray[np.int64]]:
+    """Divide a flat plate in space into tetrahedra, one layer of them through the thickness.
+
+    Parameters
+    ----------
+    outline : (n, 3) ndarray
+        Corners in order, in one plane: the middle of the thickness (m).
+    thickness, size : float
+        (m)
+
+    Returns
+    -------
+    (p, 3) ndarray, (m, 4) ndarray of int
+
+    Raises
+    ------
+    InputError
+        The triangles do not fill the polygon.
+    """
+    axes = plane_axes(outline)
+    middle = outline.mean(axis=0)
+    flat, triangles = divide((outline - middle) @ axes.T, size)
+    count = len(flat)
+    half = np.array([0.0, 0.0, thickness / 2.0])
+    points = np.vstack([flat - half, flat + half])
+    # Cut along the diagonals from the lower of two numbers at the bottom: neighbours agree on them.
+    a, b, c = np.sort(triangles, axis=1).T
+    cells = np.concatenate(
+        [
+            np.column_stack([a, b, c, c + count]),
+            np.column_stack([a, b, b + count, c + count]),
+            np.column_stack([a, a + count, b + count, c + count]),
+        ]
+    )
+    spans = points[cells[:, :3]] - points[cells[:, 3:]]
+    turned = np.linalg.det(spans) < 0.0
+    cells[np.ix_(turned, [0, 1])] = cells[np.ix_(turned, [1, 0])]
+    return points @ axes + middle, cells.astype(np.int64)
 
 
 def _area(corners: Array) -> float:

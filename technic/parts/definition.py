@@ -218,23 +218,26 @@ class TrussBody:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlateBody:
-    """A flat plate in the plane z = 0 that deforms in its plane (plane stress).
+    """A flat plate: in the plane z = 0, deforming in its plane (plane stress), or in space.
 
     Parameters
     ----------
     outline : (n, 3) array_like
-        Corners of a simple polygon, in order, either way round (m).
+        Corners of a simple polygon, in order, either way round (m): the middle of the thickness.
     thickness : float
         (m)
     material : Material
     size : float
         Edge length of the triangles it is divided into (m).
+    spatial : bool
+        True for a plate in any plane that bends, too: each triangle becomes a prism of tetrahedra.
     """
 
     outline: Array
     thickness: float
     material: Material
     size: float
+    spatial: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outline", readonly(self.outline))

@@ -27,6 +27,11 @@ __all__ = ["Solid", "sharp_edges", "solid_of", "world_points"]
 _SHARP = np.cos(np.radians(30.0))
 """Neighbouring triangles that meet at more than this show an edge; circles have 20 sides (18 degrees)."""
 
+_DRAWN_MOST = 20_000
+"""Triangles of a library part that are drawn; the parts of real models have some thousand."""
+
+_SAME_CORNER = 0.01 * LDU
+
 _PORT_RADIUS = 4 * LDU
 _STRUT_RADIUS = 2 * LDU
 
@@ -110,9 +115,12 @@ def _tubes(part: Part | PartDefinition) -> Surface:
 def _skin(body: PlateBody | MeshBody) -> Solid:
     """Return the surface of a plate, both sides of it, or of a body of tetrahedra."""
     if isinstance(body, PlateBody):
-        from technic.fem.plate import divide
+        from technic.fem.plate import divide, slab
 
-        points, cells = divide(body.outline, body.size)
+        if body.spatial:
+            points, cells = slab(body.outline, body.thickness, body.size)
+        else:
+            points, cells = divide(body.outline, body.size)
     else:
         points, cells = np.asarray(body.points), body.cells
     sides = list(combinations(range(cells.shape[1]), cells.shape[1] - 1))
@@ -130,6 +138,21 @@ def _skin(body: PlateBody | MeshBody) -> Solid:
     return Solid(points, outer, sharp_edges(points, outer))
 
 
+def _drawn(triangles: Array) -> Solid | None:
+    """Return the surface that a parts library draws; None for one too heavy for a picture."""
+    if not 0 < len(triangles) <= _DRAWN_MOST:
+        return None
+    corners = triangles.reshape(-1, 3)
+    # corners that are meant to be one differ by the digits of the files
+    _, first, number = np.unique(
+        np.rint(corners / _SAME_CORNER), axis=0, return_index=True, return_inverse=True
+    )
+    faces = number.reshape(-1, 3)
+    flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+    points, faces = corners[first], faces[~flat]
+    return Solid(points, faces, sharp_edges(points, faces)) if len(faces) else None
+
+
 def _build(part: Part | PartDefinition, definition: PartDefinition | None) -> Solid:
     if definition is not None:
         from technic.parts import shapes
@@ -139,6 +162,10 @@ def _build(part: Part | PartDefinition, definition: PartDefinition | None) -> So
             points = np.asarray(shape.vertices, dtype=float)
             faces = np.asarray(shape.faces, dtype=np.int64)
             return Solid(points, faces, sharp_edges(points, faces))
+        if definition.drawing is not None:
+            drawn = _drawn(np.asarray(definition.drawing.triangles()))
+            if drawn is not None:
+                return drawn
     if isinstance(part.body, PlateBody | MeshBody):
         return _skin(part.body)
     stand_in = _tubes(part)

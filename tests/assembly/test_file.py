@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import technic
+from technic.assembly.builder import Linkage
 from technic.assembly.file import build_assembly, load_assembly, schema
 from technic.errors import InputError, SchemaError
+from technic.fem.build import build_element
 from technic.parts.definition import FrameBody, RigidBody, TrussBody
 
 SQUARE = {"kind": "rectangle", "width": 0.004, "height": 0.006}
@@ -166,7 +169,7 @@ FAULTS = [
     (
         ["parts", 2, "shape"],
         {"kind": "polygon", "points": [[0, 0], [1, 0], [0, 1]], "thickness": 1},
-        r"\$\.parts\[2\]\.shape\.kind: a polygon is",
+        r"\$\.parts\[2\]\.shape\.points\[0\]: a point in three dim",
     ),
     (["materials", "steel", "poisson"], 0.5, r"\$\.materials\.steel\.poisson"),
     (["joints", 0, "type"], "weld", r"\$\.joints\[0\]\.type: 'weld' is not one of: fixed, hinge"),
@@ -308,3 +311,39 @@ def test_a_support_in_the_plane_holds_something():
     assert build_assembly(plane({"type": "hinge"}, held=["x", "z"])).supports[0].held.sum() == 1
     with pytest.raises(SchemaError, match=r"\$\.supports\[0\]\.held: holds nothing"):
         build_assembly(plane({"type": "hinge"}, held=["z"]))
+
+
+def test_a_plate_in_space_weighs_what_it_is():
+    side, thickness = 0.1, 0.004
+    turn = Rotation.from_rotvec([0.3, 1.1, -0.4]).as_matrix()
+    flat = np.array([(0, 0, 0), (side, 0, 0), (side, side / 2, 0), (0, side / 2, 0)])
+    linkage = Linkage(3)
+    linkage.plate("plate", *(flat @ turn.T + 0.02), thickness=thickness)
+    part = linkage.assembly().parts[0]
+    mass = part.mass_properties
+    a, b, c = side, side / 2, thickness
+    assert mass.mass == pytest.approx(1050 * a * b * c)
+    assert mass.centroid == pytest.approx(turn @ [a / 2, b / 2, 0] + 0.02)
+    box = mass.mass / 12 * np.diag([b * b + c * c, a * a + c * c, a * a + b * b])
+    assert mass.inertia == pytest.approx(turn @ box @ turn.T, abs=1e-12)
+    element = build_element(part.body, mass, np.zeros((0, 3)))
+    assert element.rigid.T @ element.mass @ element.rigid == pytest.approx(
+        np.block([[np.eye(3) * mass.mass, np.zeros((3, 3))], [np.zeros((3, 3)), mass.inertia]]),
+        abs=1e-9,
+    )
+    assert np.abs(element.stiffness @ element.rigid).max() < 1e-9 * np.abs(element.stiffness).max()
+
+
+@pytest.mark.parametrize(
+    ("corners", "fault"),
+    [
+        ([(0, 0, 0), (1, 0, 0), (1, 1, 0.1), (0, 1, 0)], "leaves the plane of the others"),
+        ([(0, 0, 0), (1, 0, 0), (2, 0, 0)], "encloses no area"),
+    ],
+)
+def test_a_plate_in_space_is_flat(corners, fault):
+    linkage = Linkage(3)
+    linkage.plate("plate", *corners, thickness=0.01)
+    with pytest.raises(SchemaError, match=fault) as caught:
+        linkage.assembly()
+    assert "$.parts[0].shape.points" in str(caught.value)

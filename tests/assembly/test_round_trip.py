@@ -43,6 +43,8 @@ def random_linkage(seed, dimension):
             linkage.truss(name, p, q, area=rng.uniform(1e-5, 1e-3))
         elif which == 2 and dimension == 2:
             linkage.plate(name, p, q, rng.uniform(-1, 1, 2), thickness=0.01, size=0.3)
+        elif which == 2 and rng.random() < 0.5:
+            linkage.plate(name, p, q, rng.uniform(-1, 1, 3), thickness=0.02, size=0.5)
         elif rng.random() < 0.5:
             linkage.rigid(name)
         else:

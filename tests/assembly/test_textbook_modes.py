@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from technic import analyze
 from technic.assembly.builder import Linkage
@@ -109,6 +110,23 @@ def test_a_plate_of_triangles_bends_as_a_beam():
     section = {"kind": "rectangle", "width": 0.003, "height": height}
     bar.bar("bar", (0, 0), (length, 0), section=section, material="steel", elements=16)
     np.testing.assert_allclose(frequencies(plate, 3), frequencies(bar, 3), rtol=0.01)
+
+
+def test_a_plate_in_space_bends_and_twists_as_the_textbook_says():
+    # Thin square plate, free all round, Poisson's ratio 0.3: Leissa 1973, "The free vibration of rectangular
+    # plates", J. Sound Vib. 31, 257-293: upper bounds by Ritz's method, about 1 % high
+    side, thickness = 0.1, 0.001
+    turn = Rotation.from_rotvec([0.4, -0.7, 0.2]).as_matrix()
+    corners = [turn @ [x, y, 0.03] for x, y in [(0, 0), (side, 0), (side, side), (0, side)]]
+    model = Linkage(3)
+    model.material(*STEEL)
+    model.plate("plate", *corners, thickness=thickness, material="steel", size=side / 9)
+    _, young, poisson, density = STEEL
+    bending = young * thickness**3 / (12 * (1 - 0.3**2))
+    unit = np.sqrt(bending / (density * thickness)) / side**2 / (2 * np.pi)
+    assert poisson == 0.3
+    found = np.array(frequencies(model, 3)) / unit
+    np.testing.assert_allclose(found, [13.489, 19.789, 24.432], rtol=0.02)
 
 
 @pytest.mark.parametrize("order", [1, 2])
