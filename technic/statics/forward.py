@@ -58,12 +58,12 @@ class _Plan:
     sags : list
         Model, its parameters, and its conditions.
     taps : list
-        Model, its parameters, the weight (kg), and its conditions.
+        Model, its parameters, its conditions, and their weights (kg).
     """
 
     down: Array
     sags: list[tuple[RigModel, list[int], NDArray[np.int64]]]
-    taps: list[tuple[TapModel, list[int], float, NDArray[np.int64]]]
+    taps: list[tuple[TapModel, list[int], NDArray[np.int64], Array]]
 
 
 def forward_model(
@@ -106,27 +106,21 @@ def forward_model(
 
     @cache
     def plan(conditions: tuple[Condition, ...]) -> _Plan:
-        def members(key: object, *, tap: bool) -> NDArray[np.int64]:
-            return np.array(
-                [
-                    k
-                    for k, c in enumerate(conditions)
-                    if c.tap is tap
-                    and key == ((c.rig, c.place, c.mass) if tap else (c.rig, c.place))
-                ],
-                dtype=np.int64,
-            )
+        def members(key: tuple[str, str], *, tap: bool) -> NDArray[np.int64]:
+            found = [
+                k for k, c in enumerate(conditions) if c.tap is tap and (c.rig, c.place) == key
+            ]
+            return np.array(found, dtype=np.int64)
 
-        down = np.array([rigs[c.rig].poses[c.pose].down_at(c.angle_deg) for c in conditions])
-        still = sorted({(c.rig, c.place) for c in conditions if not c.tap})
-        swung = sorted({(c.rig, c.place, c.mass) for c in conditions if c.tap})
+        def keys(*, tap: bool) -> list[tuple[str, str]]:
+            return sorted({(c.rig, c.place) for c in conditions if c.tap is tap})
+
+        mass = np.array([c.mass for c in conditions])
+        swung = [(key, members(key, tap=True)) for key in keys(tap=True)]
         return _Plan(
-            down,
-            [(sag_models[key], own(key[0]), members(key, tap=False)) for key in still],
-            [
-                (tapped(name, place), own(name), mass, members((name, place, mass), tap=True))
-                for name, place, mass in swung
-            ],
+            np.array([rigs[c.rig].poses[c.pose].down_at(c.angle_deg) for c in conditions]),
+            [(sag_models[key], own(key[0]), members(key, tap=False)) for key in keys(tap=False)],
+            [(tapped(*key), own(key[0]), found, mass[found]) for key, found in swung],
         )
 
     def forward(conditions: Sequence[Condition], log_stiffness: Array) -> Response:
@@ -142,7 +136,7 @@ def forward_model(
                 value[half, members] = scale * np.einsum("ci,ij,cj->c", d, answer[:, columns], d)
                 sloped = np.einsum("ci,pij,cj->cp", d, change[:, :, columns], d)
                 slope[half][np.ix_(members, np.array(chosen))] = scale * sloped
-        for tap, chosen, mass, members in todo.taps:
+        for tap, chosen, members, mass in todo.taps:
             found = tap.response(stiffness[chosen], mass, todo.down[members])
             value[2, members], slope[2][np.ix_(members, np.array(chosen))] = found
         return Response(value[0], value[1], slope[0], slope[1], value[2], slope[2])

@@ -56,7 +56,7 @@ def test_equals_the_whole_model_at_any_stiffness_and_weight(
     values = scale * 1.3 ** np.arange(len(parameters)) * model.start
     for pose in rig.poses.values():
         down = pose.down_at(pose.angle_deg)
-        (found,), _ = model.response(values, mass, down[None])
+        (found,), _ = model.response(values, [mass], down[None])
         said = whole_model(rig, place, parameters, values, mass, down)
         assert found == pytest.approx(said, rel=1e-6)
 
@@ -69,10 +69,11 @@ def test_derivative_equals_finite_differences(name, place, connection, motions):
     model = tap_model(assembly, parse_probe(assembly, place), parameters, table, element=element_of)
     downs = np.array([pose.down_at(pose.angle_deg) for pose in rig.poses.values()])
     at, step = 0.6 * model.start, 1e-5
-    value, slope = model.response(at, 0.05, downs)
+    weights = np.linspace(0.0, 0.1, len(downs))
+    value, slope = model.response(at, weights, downs)
     for k in range(len(parameters)):
         up, down = (
-            model.response(at * np.exp(s * step * np.eye(len(at))[k]), 0.05, downs)[0]
+            model.response(at * np.exp(s * step * np.eye(len(at))[k]), weights, downs)[0]
             for s in (1, -1)
         )
         assert slope[:, k] == pytest.approx((up - down) / (2 * step), rel=1e-5, abs=1e-7)
@@ -88,7 +89,7 @@ def test_closed_form_of_a_heavy_weight_on_a_spring(down):
     pins = np.array([p.pose.translation for p in assembly.parts if p.number == "2780"])
     model = tap_model(assembly, probe, list(PIN), table, element=rigid_element_of)
     mass, push = 5.0, np.array([down], dtype=float)
-    (found,), _ = model.response(TRUTH, mass, push)
+    (found,), _ = model.response(TRUTH, [mass], push)
     if down[1] == 1:
         sag = closed_form(pins, probe.point, push[0], SHEAR, TILT, 0.008)
         assert found == pytest.approx(np.sqrt(1 / (sag * mass)) / (2 * np.pi), rel=0.01)
@@ -103,6 +104,26 @@ def test_closed_form_of_a_heavy_weight_on_a_spring(down):
     mixed = slant - (along + across) / 2
     softest = np.linalg.eigvalsh([[along, mixed], [mixed, across]])[-1]
     assert found == pytest.approx(np.sqrt(1 / (softest * mass)) / (2 * np.pi), rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["pin-pair", "pin-sandwich", "axle-lever"])
+def test_many_weights_are_interpolated_exactly_enough(name):
+    rig, table = shipped_rigs()[name], default_table()
+    (connection, motions), *_ = rig.joints.items()
+    parameters = [Parameter(connection, m) for m in motions]
+    assembly = held_rig(rig, table)
+    model = tap_model(assembly, parse_probe(assembly, rig.loads[0].place), parameters, table)
+    random = np.random.default_rng(2)
+    weights = random.uniform(0.01, 0.2, 60)
+    downs = [pose.down_at(pose.angle_deg) for pose in rig.poses.values()]
+    down = np.array([downs[k % len(downs)] for k in range(len(weights))])
+    together = model.response(0.8 * model.start, weights, down)
+    alone = [
+        model.response(0.8 * model.start, [m], d[None]) for m, d in zip(weights, down, strict=True)
+    ]
+    for k in range(2):
+        expected = np.concatenate([answer[k] for answer in alone])
+        assert together[k] == pytest.approx(expected, rel=1e-6, abs=1e-7 * np.abs(expected).max())
 
 
 def taps(plan=BOTH, *, seed=None, repeats=4, scatter=0.01, step=0.1, values=(SHEAR, TILT)):
