@@ -31,6 +31,7 @@ _NAMES: Final = {
     "spring": ("shock absorber", "its rod"),
     "universal": ("universal joint", "its second fork"),
     "clutch": ("clutch gear", "its centre"),
+    "pump": ("pump", "its rod"),
 }
 
 
@@ -127,6 +128,7 @@ def _only(
         mass_properties=mass,
         aliases=(),
         shape={},
+        drawing=None,
     )
 
 

@@ -11,8 +11,11 @@ from technic.assembly.joint_types import JointType
 from technic.assembly.model import FindingKind, Part
 from technic.errors import SchemaError, UsageError
 from technic.geometry import Pose
+from technic.groups import connected_groups
 from technic.ldraw.gears import find_meshes
+from technic.ldraw.imported import definition_from_library
 from technic.ldraw.inner import divide
+from technic.ldraw.library import Library
 from technic.ldraw.reader import load_ldraw
 from technic.parts.catalogue import catalogue
 from technic.parts.inner import inner_parts, parse_inner
@@ -57,6 +60,32 @@ def test_every_part_of_the_catalogue_divides_and_loses_nothing(number):
     assert [joint.parts for joint in hung] == [(0, k + 1) for k in range(len(bodies))]
     for joint in whole.joints:
         assert (joint.stiffness[joint.held] > 0.0).all()
+
+
+@pytest.mark.slow
+def test_every_part_of_the_table_divides_as_the_library_draws_it(ldraw_library):
+    library = Library.open(ldraw_library)
+    looked = 0
+    for number, entry in inner_parts().items():
+        definition = definition_from_library(library, number)
+        if definition is None:
+            continue
+        part = Part(
+            "p",
+            number,
+            definition.title,
+            Pose.identity(),
+            definition.ports,
+            definition.body,
+            definition.mass_properties,
+            definition=definition,
+        )
+        whole = divide([part], "free")
+        assert len(whole.parts) == 1 + len(entry.bodies), (number, definition.title)
+        joined = connected_groups(range(len(whole.parts)), (j.parts for j in whole.joints))
+        assert len(joined) == 1
+        looked += 1
+    assert looked > 60
 
 
 def test_a_motor_holds_unless_it_is_free():
