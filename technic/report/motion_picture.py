@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -53,6 +53,16 @@ def _groups(motion: Motion, report: RigidityReport) -> list[list[int]]:
         if not all(report.assembly.parts[motion.parts[i]].fastener for i in group)
     ]
     return sorted(frames or list(groups.values()), key=len, reverse=True)
+
+
+def _forward(motion: Motion) -> Motion:
+    """Return a motion in the one of its two senses in which its first large component is positive.
+
+    Which of the two the null space gives is chance; a picture should not change with it.
+    """
+    values = np.asarray(motion.twists).ravel()
+    first = int(np.argmax(np.abs(values) > 0.99 * np.abs(values).max(initial=0.0)))
+    return motion if values[first] >= 0.0 else replace(motion, twists=-motion.twists)
 
 
 def _glyph(
@@ -118,7 +128,8 @@ def motion_layers(
     diagonal : float
         Of the model (m).
     """
-    motions = [motion for motion in report.motions if motion.kind is MotionKind.STRUCTURAL]
+    structural = [motion for motion in report.motions if motion.kind is MotionKind.STRUCTURAL]
+    motions = [_forward(motion) for motion in structural]
     if not motions:
         return None
     first = motions[0]

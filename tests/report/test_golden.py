@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
+from technic.report.picture import report_scene
 from technic.report.render import Painter
 from tests.report.golden_cases import CASES, FOLDER
 from tests.report.perception import likeness, small
@@ -69,3 +71,14 @@ def test_another_case_is_another_picture() -> None:
     for k, one in enumerate(names):
         for other in names[k + 1 :]:
             assert not likeness(kept(one), kept(other)).same
+
+
+def test_picture_does_not_depend_on_the_sense_of_a_motion(scissors) -> None:
+    """A null space has two signs; the picture has one."""
+    turned = [replace(motion, twists=-motion.twists) for motion in scissors.motions]
+    other = replace(scissors, motions=tuple(turned))
+    arrows = [
+        next(s for s in report_scene(report).panels[0].surfaces if s.on_top)
+        for report in (scissors, other)
+    ]
+    np.testing.assert_allclose(arrows[0].points, arrows[1].points, atol=1e-12)
