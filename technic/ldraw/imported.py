@@ -107,10 +107,10 @@ def definition_from_library(
     )
 
 
-def _drawing(library: Library, number: str, solids: Solids) -> Drawing | None:
-    if solids == "off" or number.lower().removesuffix(".dat") in inner_parts():
-        return None
-    return Drawing(partial(_triangles, library, number, fine=solids == "fine"), CELLS[solids])
+def _drawing(library: Library, number: str, solids: Solids) -> Drawing:
+    whole = number.lower().removesuffix(".dat") not in inner_parts()
+    cell = CELLS[solids] if solids != "off" and whole else 0.0
+    return Drawing(partial(_triangles, library, number, fine=solids == "fine"), cell)
 
 
 def _triangles(library: Library, number: str, *, fine: bool) -> Array:

@@ -129,6 +129,7 @@ def _only(
         aliases=(),
         shape={},
         drawing=None,
+        drawing=None,
     )
 
 

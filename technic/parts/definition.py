@@ -291,7 +291,7 @@ class Drawing:
         Returns the corners, (n, 3, 3), part coordinates (m), counter-clockwise seen from outside. They
         are read when they are asked for. The surface need not be closed.
     cell : float
-        Edge of the cells that the solid model is to be made of (m).
+        Edge of the cells that the solid model is to be made of (m); 0: it is not to be meshed.
     """
 
     triangles: Callable[[], Array]

@@ -103,6 +103,8 @@ def _request(definition: PartDefinition) -> _Request | Refusal:
     drawing = definition.drawing
     if drawing is None:
         return Refusal("it has no drawing")
+    if drawing.cell == 0.0:
+        return Refusal("it moves inside, or meshing is turned off")
     if definition.fastener:
         return Refusal("a pin or small connector: its give is in the joints")
     holes = sum(port.kind not in _EVEN for port in definition.ports)

@@ -184,7 +184,7 @@ def _reason(part: Part) -> str:
     if part.definition is None or part.definition.family != LIBRARY_FAMILY:
         return "no solid model is shipped"
     if part.definition.drawing is None:
-        return "from the parts library: it moves inside, or meshing is turned off"
+        return "a piece of a part that moves inside"
     made = outcome_of(part.definition)
     assert isinstance(made, Refusal)  # or it would be solid
     return made.reason

@@ -11,7 +11,7 @@ from technic.ldraw.document import read
 from technic.ldraw.finder import EmbeddedStore, PartFinder
 from technic.ldraw.library import Library
 from technic.ldraw.reader import load_ldraw, lookup
-from tests.ldraw.small_library import files_with, line, part, write_folder
+from tests.ldraw.small_library import files_with, line, part, there, write_folder
 
 BEAM = "1 4 0 0 0 1 0 0 0 1 0 0 0 1 32316.dat\n"
 PIN = "1 0 0 -10 40 0 1 0 1 0 0 0 0 1 2780.dat\n"
@@ -166,3 +166,29 @@ def test_surfaces_that_double_at_every_level_are_refused(library, model):
     full = library(xbeam=part(line("level0.dat")), level50=part(HOLE), **chain)
     (unknown,) = load_ldraw(model(BEAM, PIN, OWN), library=full).unknown
     assert "more than" in unknown.reason
+
+
+# --- solid models of library parts ------------------------------------------------------------
+@pytest.mark.parametrize(("solids", "cell"), [("draft", 1.6e-3), ("fine", 0.8e-3), ("off", 0.0)])
+def test_how_finely_library_parts_are_to_be_meshed(library, model, solids, cell):
+    place = library(xbeam=part(HOLE))
+    assembly = load_ldraw(model(BEAM, OWN), library=place, solids=solids)
+    known, drawn = (there(p.definition) for p in assembly.parts)
+    assert known.drawing is None
+    drawing = there(drawn.drawing)
+    assert drawing.cell == pytest.approx(cell)
+    assert drawing.triangles().shape[1:] == (3, 3)
+
+
+def test_parts_that_move_inside_are_never_meshed(library):
+    from technic.ldraw.imported import definition_from_library
+    from technic.parts.inner import inner_parts
+
+    number = next(iter(inner_parts()))
+    made = there(definition_from_library(library(**{number: part(HOLE)}), number))
+    assert there(made.drawing).cell == 0.0
+
+
+def test_an_unknown_setting_is_refused(model):
+    with pytest.raises(UsageError, match="solids is"):
+        load_ldraw(model(BEAM), solids="coarse")
