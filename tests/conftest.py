@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,9 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 os.environ.setdefault("PYVISTA_OFF_SCREEN", "true")
+# What the program caches during tests is theirs: not in the user's folder, and gone afterwards.
+_CACHE = tempfile.TemporaryDirectory(prefix="technic-tests-")
+os.environ.setdefault("TECHNIC_CACHE", _CACHE.name)
 # Settings of the person who runs the tests must not reach them.
 os.environ["TECHNIC_CONFIG"] = str(Path(__file__).resolve().parent / "no_settings")
 

@@ -22,6 +22,7 @@ from technic.commands.options import (
 )
 from technic.commands.progress import progress_bar
 from technic.commands.reading import model_options, reading
+from technic.commands.solids import make_solids
 from technic.commands.suggest_bars import BarWishes, suggest_for_linkage
 from technic.errors import MissingDependency, UsageError
 
@@ -327,6 +328,7 @@ def suggest(
     _refuse({"--shortest": shortest, "--longest": longest}, "for assembly files; see --lengths")
     options = reading(model, how)
     assembly = load(model, **options)
+    make_solids(assembly, "solid", quiet=quiet)
     wishes = _Wishes(
         between, box, lengths, straight, also, snug, inventory, max_parts, tuple(keep_out or ())
     )
