@@ -55,14 +55,8 @@ def elastic_modes(
 
     Parameters
     ----------
-    stiffness : (n, n) sparse
-        ``K + J``, positive semi-definite.
-    measure : (n, n) sparse
-        ``M``, positive definite.
-    constraints : (c, n) sparse
-        Rows held rigidly; they may depend on each other.
-    motions : (n, k) sparse
-        Basis of all unknowns that cost no energy and break no constraint.
+    stiffness, measure, constraints, motions : sparse
+        As for `technic.system.inverse.shifted_inverse`.
     count : int
         Pairs wanted; fewer are returned when there are fewer, or when rounding drowns the higher
         ones (eigenvalues a billion times the lowest).
