@@ -32,6 +32,7 @@ _NAMES: Final = {
     "universal": ("universal joint", "its second fork"),
     "clutch": ("clutch gear", "its centre"),
     "pump": ("pump", "its rod"),
+    "turntable": ("turntable", "its top"),
 }
 
 
@@ -128,7 +129,6 @@ def _only(
         mass_properties=mass,
         aliases=(),
         shape={},
-        drawing=None,
         drawing=None,
     )
 

@@ -34,7 +34,7 @@ ROTATION: Final = 0.16
 
 ASSUMED: Final = "assumed"
 
-_KINDS: Final = ("motor", "actuator", "spring", "universal", "clutch", "pump")
+_KINDS: Final = ("motor", "actuator", "spring", "universal", "clutch", "pump", "turntable")
 _JOINTS: Final = ("hinge", "slider", "cylindrical", "ball", "universal")
 _MOTIONS: Final = ("axial", "shear", "spin", "tilt")
 

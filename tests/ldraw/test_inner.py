@@ -17,6 +17,7 @@ from technic.ldraw.imported import definition_from_library
 from technic.ldraw.inner import divide
 from technic.ldraw.library import Library
 from technic.ldraw.reader import load_ldraw
+from technic.ldraw.teeth import gears_of
 from technic.parts.catalogue import catalogue
 from technic.parts.inner import inner_parts, parse_inner
 from technic.rigidity.analyze import analyze
@@ -187,6 +188,28 @@ def test_a_thread_lets_the_rod_move_by_its_lead_and_no_other_way(
     slip = speed(swirl + turning * along, push) - speed(swirl + rolling * along, push + way * along)
     assert abs(slip) < 1e-12
     assert abs(speed(0.0 * along, along)) == pytest.approx(1.0, abs=0.01)  # pushed: it holds
+
+
+def test_a_complete_turntable_turns_and_its_pieces_have_their_teeth(ldraw_library):
+    definition = definition_from_library(Library.open(ldraw_library), "50163")
+    assert definition is not None
+    table = Part(
+        "t",
+        "50163",
+        definition.title,
+        Pose.identity(),
+        definition.ports,
+        definition.body,
+        definition.mass_properties,
+        definition=definition,
+    )
+    whole = divide([table])
+    assert [part.id for part in whole.parts] == ["t", "t#top"]
+    assert [len(part.ports) for part in whole.parts] == [6, 6]
+    (joint,) = whole.joints
+    assert joint.type is JointType.HINGE
+    gears = [gears_of(part, k)[0].teeth for k, part in enumerate(whole.parts)]
+    assert [(teeth.teeth, teeth.inner) for teeth in gears] == [(24, True), (56, False)]
 
 
 def test_a_clutch_gear_slips_when_it_may():
