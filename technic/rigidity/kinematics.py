@@ -300,12 +300,15 @@ def merge_fixed(kin: Kinematics, parts: tuple[int, ...], links: list[int]) -> di
 
     The head is the part nearest to the body's middle, so that arms stay short.
     """
-    pairs = [kin.owners[k] for k in links if len(kin.owners[k]) == 2 and kin.held[k].all()]
+    chosen = np.array(links, dtype=np.int64)
+    chosen = chosen[kin.held[chosen].all(axis=1) & (kin.pairs[chosen, 1] >= 0)]
     heads: dict[int, int] = {}
-    for group in connected_groups(parts, ((a, b) for a, b in pairs)):
-        members = list(group)
-        middle = kin.origins[members].mean(axis=0)
-        near = np.linalg.norm(kin.origins[members] - middle, axis=1).round(9)
-        head = members[int(np.argmin(near))]
-        heads.update(dict.fromkeys(members, head))
+    for group in connected_groups(parts, ((int(a), int(b)) for a, b in kin.pairs[chosen])):
+        head = group[0]
+        if len(group) > 1:
+            members = list(group)
+            middle = kin.origins[members].mean(axis=0)
+            near = np.linalg.norm(kin.origins[members] - middle, axis=1).round(9)
+            head = members[int(np.argmin(near))]
+        heads.update(dict.fromkeys(group, head))
     return heads
