@@ -8,6 +8,7 @@ material. Shape functions with shear: J. S. Przemieniecki, *Theory of Matrix Str
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -204,9 +205,17 @@ def member_matrices(
         raise InputError("the normal of a frame member is parallel to the member")
     z = z / size
     turn = np.kron(np.eye(2), turn_twist(np.array([x, cross(z, x), z])))
-    k = local_stiffness(lengths, section, material)
-    m = local_mass(lengths, section, material)
+    k, m = _own_axes(tuple(lengths.round(12).tolist()), section, material)
     return turn.T @ k @ turn, turn.T @ m @ turn
+
+
+@lru_cache(maxsize=256)
+def _own_axes(
+    lengths: tuple[float, ...], section: Section, material: Material
+) -> tuple[Array, Array]:
+    """Return stiffness and mass in the members' own axes: the bars of a linkage are often equally long."""
+    sizes = np.array(lengths)
+    return local_stiffness(sizes, section, material), local_mass(sizes, section, material)
 
 
 AXIAL: Any = np.ix_([0, 6], [0, 6])
