@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from technic.assembly.model import Assembly
+    from technic.commands.progress import Tell
     from technic.system.assemble import Probe
     from technic.system.port_walls import RigidWalls
 
@@ -30,7 +30,7 @@ def make_solids(assembly: Assembly, parts: str, *, quiet: bool) -> None:
         return
     from technic.system.drawn_solids import prepare
 
-    with _bar("library parts", shown=not quiet and sys.stderr.isatty()) as progress:
+    with _bar("library parts", shown=not quiet) as progress:
         prepare(assembly, progress=progress)
 
 
@@ -42,29 +42,25 @@ def make_walls(
 
     from technic.system.port_walls import rigid_walls
 
-    with _bar("parts with rigid bores", shown=not quiet and sys.stderr.isatty()) as progress:
+    with _bar("rigid bores", shown=not quiet) as progress:
         return rigid_walls(assembly, probes=probes, jobs=os.cpu_count() or 1, progress=progress)
 
 
 @contextmanager
 def _bar(what: str, *, shown: bool) -> Iterator[Callable[[int, int, str], None] | None]:
-    """Show a bar on the terminal, once there is something to show; yields what moves it on."""
+    """Yield what moves a bar on; it appears once there is something to show."""
     if not shown:
         yield None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from technic.commands.progress import progress_bar
 
-    columns = (
-        TextColumn(f"meshing {what}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.description}"),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=None, visible=False)
+    with ExitStack() as stack:
+        tell: Tell | None = None
 
-        def move(done: int, total: int, title: str) -> None:
-            bar.update(task, completed=done, total=total, description=title[:40], visible=True)
+        def move(done: int, total: int, _title: str) -> None:
+            nonlocal tell
+            if tell is None:
+                tell = stack.enter_context(progress_bar())
+            tell(what, done, total)
 
         yield move
