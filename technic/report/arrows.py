@@ -48,9 +48,10 @@ def _sweep(path: Array, radii: Array, color: RGB) -> Surface:
     return Surface(points, np.concatenate(faces), np.tile(color, (len(points), 1)))
 
 
-def tube(start: Array, end: Array, radius: float, color: RGB) -> Surface:
-    """Return a round bar from `start` to `end`."""
-    return _sweep(np.array([start, end], dtype=float), np.full(2, radius), color)
+def tube(start: Array, end: Array, radius: float, color: RGB, rings: int = 2) -> Surface:
+    """Return a round bar from `start` to `end`; with more than two rings it can be bent."""
+    path = np.linspace(np.asarray(start, dtype=float), np.asarray(end, dtype=float), rings)
+    return _sweep(path, np.full(rings, radius), color)
 
 
 def arrow(start: Array, vector: Array, radius: float, color: RGB) -> Surface:

@@ -19,12 +19,17 @@ ARROW_SHARE = 0.16
 ARROW_RADIUS = 0.0045
 _ARROWS = 24
 _APART = 0.04
+_BULGE = 1.25
+"""A point between the ends of a part has an arrow when its load is so many times theirs."""
+
 _FAINT = 0.25
 """Loads below this share of the largest are not drawn."""
 
 
 def _sample_pairs(report: RigidityReport, field: WorstField) -> list[tuple[int, int]]:
-    """Return (part, sample) pairs where arrows may stand: both ends of each part of structure."""
+    """Return (part, sample) pairs where arrows may stand: both ends of each part of structure, and the
+    point between them that is pushed harder.
+    """
     parts = report.assembly.parts
     members = report.components[0].parts
     frames = [k for k in members if not parts[k].fastener] or list(members)
@@ -36,7 +41,12 @@ def _sample_pairs(report: RigidityReport, field: WorstField) -> list[tuple[int, 
         where = field.points[mine]
         _, _, vt = np.linalg.svd(where - where.mean(axis=0), full_matrices=False)
         along = (where - where.mean(axis=0)) @ vt[0]
-        chosen += [(k, int(mine[i])) for i in sorted({int(along.argmin()), int(along.argmax())})]
+        ends = {int(along.argmin()), int(along.argmax())}
+        # A bar that bends is pushed in its middle.
+        ways = np.linalg.norm(field.displacements[mine], axis=1)
+        if ways.max() > _BULGE * max(ways[i] for i in ends):
+            ends.add(int(ways.argmax()))
+        chosen += [(k, int(mine[i])) for i in sorted(ends)]
     return chosen
 
 

@@ -126,6 +126,8 @@ def _spot_markers(report: RigidityReport, points: tuple[Array, ...]) -> tuple[Ma
         fasteners = [k for k in spot.parts if report.assembly.parts[k].fastener]
         k = (fasteners or list(spot.parts))[0]
         middle = 0.5 * (points[k].min(axis=0) + points[k].max(axis=0))
+        if spot.kind == "part":  # a bent bar is not in the middle of its box
+            middle = points[k][int(np.argmin(np.linalg.norm(points[k] - middle, axis=1)))]
         markers.append(Marker(middle, str(spot.rank)))
     return tuple(markers)
 

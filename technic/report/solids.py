@@ -35,6 +35,9 @@ _SAME_CORNER = 0.01 * LDU
 _PORT_RADIUS = 4 * LDU
 _STRUT_RADIUS = 2 * LDU
 
+_RINGS = 13
+"""Circles along a member that bends: enough for a curve to look like one."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solid:
@@ -95,7 +98,7 @@ def _tubes(part: Part | PartDefinition) -> Surface:
     if isinstance(body, FrameBody):
         for (a, b), section in zip(body.members, body.sections, strict=True):
             radius = float(np.sqrt(section.area / np.pi))
-            pieces.append(tube(body.points[a], body.points[b], radius, NEUTRAL))
+            pieces.append(tube(body.points[a], body.points[b], radius, NEUTRAL, _RINGS))
     if isinstance(body, TrussBody):
         p, q = body.points
         pieces.append(tube(p, q, float(np.sqrt(body.area / np.pi)), NEUTRAL))
