@@ -171,6 +171,7 @@ def deflect(
         models_of(assembly, parts),
         plain_parts(assembly, parts),
         stiffer,
+        options.get("table"),
     )
     if json is not None:
         write_json(deflection_dict(case), json)

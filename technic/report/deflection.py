@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 
 from technic.assembly.model import Assembly, Support
+from technic.assembly.stiffness import StiffnessTable
 from technic.geometry import Array
 from technic.report.style import Style
 from technic.report.wording import count, direction_of, direction_words, number, part_name
+from technic.rigidity.provenance import table_dict, table_sentences
 from technic.rigidity.sentences import not_modelled
 from technic.rigidity.serialize import joint_stiffness
 from technic.statics.solve import Deflection, Load
@@ -55,6 +57,8 @@ class StaticCase:
         The kinds of part without a solid model, when solid models were asked for.
     rigid_walls : Deflection or None
         The same with bores that keep their shape, the least that it can sag; None when not asked for.
+    table : StiffnessTable or None
+        Stiffness table in force; None when it is the shipped one.
     """
 
     deflection: Deflection
@@ -65,6 +69,7 @@ class StaticCase:
     part_models: Mapping[str, int] = field(default_factory=dict)
     plain_parts: tuple[PlainPart, ...] = ()
     rigid_walls: Deflection | None = None
+    table: StiffnessTable | None = None
 
     @property
     def assembly(self) -> Assembly:
@@ -123,6 +128,7 @@ def deflection_dict(case: StaticCase) -> dict[str, Any]:
                 {"id": u.number, "count": u.count, "lines": list(u.lines)} for u in assembly.unknown
             ],
         },
+        "stiffness_table": table_dict(case.table),
         "loads": [
             {
                 "part": parts[load.part].id,
@@ -294,6 +300,11 @@ def deflection_text(case: StaticCase, style: Style | None = None) -> str:
         )
     for sentence in _warnings(case):
         lines += ["", *style.wrap(f"Too far: {sentence}.", "", "   ")]
+    known = table_sentences(assembly, case.table, case.part_models)
+    if known:
+        lines += ["", style("bold", "Where the joints' stiffness comes from")]
+    for sentence in known:
+        lines += style.wrap(sentence, "   ", "      ")
     missing = not_modelled(assembly)
     if missing:
         lines += ["", style("bold", "Not modelled")]

@@ -13,6 +13,7 @@ from technic.ldraw.write import NewPart
 from technic.parts.catalogue import catalogue
 from technic.report.palette import color_name
 from technic.report.suggest_text import cure_words
+from technic.rigidity.provenance import table_dict
 from technic.rigidity.result import RigidityReport
 from technic.units import LDU, MM
 
@@ -44,6 +45,7 @@ def suggestions_dict(answers: Sequence[Suggestions], *, sequence: bool) -> dict[
         "source": {key: source.get(key) for key in ("path", "sha256", "format")},
         "kind": "sequence" if sequence else "alternatives",
         "before": None if before is None else state_dict(before),
+        "stiffness_table": None if before is None else table_dict(before.table),
         "places": sum(a.places for a in answers),
         "refused": {
             reason: sum(a.refused[reason] for a in answers)

@@ -307,7 +307,7 @@ def _assumptions(report: RigidityReport, style: Style) -> list[str]:
     entries = merged_stiffness(joint_stiffness(report.assembly))
     if entries:
         lines += ["", style("bold", "Joints and where their stiffness comes from")]
-        for said_of_it in table_sentences(report):
+        for said_of_it in table_sentences(report.assembly, report.table, report.part_models):
             lines += style.wrap(said_of_it, "   ", "      ")
     for (name, kind, source), (total, values) in entries.items():
         said = []

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
+from technic.assembly.model import Assembly
 from technic.assembly.stiffness import StiffnessTable, default_table
 from technic.rigidity.result import RigidityReport
 
 __all__ = ["spots_sentence", "stability_dict", "table_dict", "table_sentences", "verdict_sentence"]
 
 
-def table_dict(report: RigidityReport) -> dict[str, Any]:
-    """Return the stiffness table in force as plain values."""
-    table = report.table or default_table()
+def table_dict(table: StiffnessTable | None) -> dict[str, Any]:
+    """Return the stiffness table in force as plain values; None stands for the shipped one."""
+    table = table or default_table()
     return {
         "name": table.name,
         "path": table.path or None,
@@ -22,29 +24,36 @@ def table_dict(report: RigidityReport) -> dict[str, Any]:
     }
 
 
-def _uses_table(report: RigidityReport, table: StiffnessTable) -> bool:
-    return any(joint.connection in table.connections for joint in report.assembly.joints)
+def table_sentences(
+    assembly: Assembly, table: StiffnessTable | None, part_models: Mapping[str, int]
+) -> list[str]:
+    """Return which table the stiffnesses come from; nothing when no joint takes its stiffness from one.
 
-
-def table_sentences(report: RigidityReport) -> list[str]:
-    """Return which table the stiffnesses come from; nothing when no joint takes its stiffness from one."""
-    table = report.table or default_table()
-    if not _uses_table(report, table):
+    Parameters
+    ----------
+    assembly : Assembly
+    table : StiffnessTable or None
+        None stands for the shipped one.
+    part_models : mapping of str to int
+        How many parts are solid models, frame members, rigid bodies.
+    """
+    used = table or default_table()
+    if not any(joint.connection in used.connections for joint in assembly.joints):
         return []
-    if report.table is None:
+    if used.found == "shipped":
         return ["table: the shipped one; `technic calibrate` measures your own bricks"]
-    how = {"given": "--calibration"}.get(table.found, table.found)
-    said = [f"table: {table.name} ({how}: {table.path})"]
-    told = table.calibration
+    how = {"given": "--calibration"}.get(used.found, used.found)
+    said = [f"table: {used.name} ({how}: {used.path})"]
+    told = used.calibration
     if "readings" in told:
         rigs = told.get("rigs")
         where = f" on {', '.join(map(str, rigs))}" if isinstance(rigs, list) and rigs else ""
         date = f", {told['date']}" if "date" in told else ""
         said.append(f"measured: {told['readings']} readings{where}{date}")
-    elif not table.measured:
+    elif not used.measured:
         said.append("measured: nothing, as far as the table says")
     parts = told.get("parts")
-    if parts and parts != "solid" and "solid" in report.part_models:
+    if parts and parts != "solid" and "solid" in part_models:
         said.append(
             f"take care: it was measured with parts taken as {parts}, here they are solid models; "
             "what the parts themselves give way is counted differently"

@@ -392,7 +392,7 @@ def to_dict(report: RigidityReport) -> dict[str, Any]:
         "stability": stability_dict(report),
         "components": [_component(assembly, component) for component in report.components],
         "joint_stiffness": joint_stiffness(assembly),
-        "stiffness_table": table_dict(report),
+        "stiffness_table": table_dict(report.table),
         "not_modelled": list(report.not_modelled),
         "timings_s": {name: float(seconds) for name, seconds in report.timings.items()},
         "technic_version": __version__,

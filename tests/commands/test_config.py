@@ -113,8 +113,12 @@ def test_the_text_names_the_table_and_where_it_was_found(run, tmp_path):
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "Table: here (technic.toml beside the model:" in page
     assert "within their uncertainty" in page or "order is not sure" in page
-    _, out, _ = run("deflect", model, "--fix", "2:32316", "--hang", "3:32316:hole5:50g")
+    loaded = ("deflect", model, "--fix", "2:32316", "--hang", "3:32316:hole5:50g")
+    _, out, _ = run(*loaded)
     assert "with 95 % confidence" in out
+    assert "table: here (technic.toml beside the model:" in " ".join(out.split())
+    _, out, _ = run(*loaded, "--json", "-")
+    assert json.loads(out)["stiffness_table"]["name"] == "here"
 
 
 @pytest.mark.parametrize(

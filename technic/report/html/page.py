@@ -128,7 +128,7 @@ def page(
         spots=spot_rows(report),
         spot_count=len(report.weak_spots),
         spots_sure=spots_sentence(report),
-        table=table_sentences(report),
+        table=table_sentences(report.assembly, report.table, report.part_models),
         motions=motion_rows(report, played),
         motion_count=len(report.motions) - sum(m.kind == "idle" for m in report.motions),
         idle=report.mobility.idle,
