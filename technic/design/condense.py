@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Final
 
 import numpy as np
 from scipy import linalg
@@ -23,7 +24,11 @@ from technic.parts.catalogue import catalogue
 from technic.parts.definition import PartDefinition
 from technic.system.part_models import FACTORIES, PartModel
 
-__all__ = ["Condensed", "Hold", "condensed", "hold_of"]
+__all__ = ["OWN", "Condensed", "Hold", "condensed", "hold_of"]
+
+
+OWN: Final = 2
+"""Swings of the beam by itself: a large part on few holes may well be what swings first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +60,17 @@ class Hold:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Condensed:
-    """Stiffness and inertia at the places that hold a beam, six rows each, and the mass it adds (kg)."""
+    """Stiffness and inertia at the places that hold a beam, six rows each, and the mass it adds (kg).
+
+    How the beam swings when what holds it stands still: `squares` of the lowest angular frequencies
+    (1/s2), modes being of unit mass (kg), and `coupling`, the inertia between each mode and the places.
+    """
 
     stiffness: Array
     inertia: Array
     mass: float
+    squares: Array
+    coupling: Array
 
 
 def hold_of(candidate: Candidate, attachment: Attachment, old: PartDefinition | None) -> Hold:
@@ -137,6 +148,8 @@ class _Matrices:
         Stiffness and inertia at the places alone.
     mass : float
         (kg)
+    rigid : (n, 6) ndarray
+        Unknowns when the beam moves as a rigid body, its pins left where they are.
     """
 
     own: Array
@@ -145,6 +158,7 @@ class _Matrices:
     outer: Array
     heavy: Array
     mass: float
+    rigid: Array
 
 
 @lru_cache(maxsize=4096)
@@ -172,10 +186,19 @@ def condensed(
         the movement of a pin that is there already.
     """
     m = _matrices(number, face, holds, pin, parts)
-    follow = -linalg.solve(m.own, m.cross, assume_a="pos")
+    factor = linalg.cho_factor(m.own)
+    follow = -linalg.cho_solve(factor, m.cross)
     stiffness = m.outer + m.cross.T @ follow
     inertia = m.heavy + follow.T @ m.inertia @ follow
-    return Condensed((stiffness + stiffness.T) / 2, (inertia + inertia.T) / 2, m.mass)
+    # how the beam sags under its own weight, in six ways, is close to how it swings (Rayleigh)
+    sag = linalg.cho_solve(factor, m.inertia @ m.rigid)
+    sag = sag / np.sqrt(np.einsum("nk,nk->k", sag, m.inertia @ sag))
+    squares, mix = linalg.eigh(
+        sag.T @ m.own @ sag, sag.T @ m.inertia @ sag, subset_by_index=[0, OWN - 1]
+    )
+    coupling = (sag @ mix).T @ m.inertia @ follow
+    stiffness, inertia = (stiffness + stiffness.T) / 2, (inertia + inertia.T) / 2
+    return Condensed(stiffness, inertia, m.mass, squares, coupling)
 
 
 def _matrices(
@@ -228,4 +251,5 @@ def _matrices(
             outer[here, here] += spring
             place += 1
         body += 6
-    return _Matrices((own + own.T) / 2, inertia, cross, outer, heavy, mass)
+    rigid = np.vstack([element.rigid, np.zeros((6 * new_pins, 6))])
+    return _Matrices((own + own.T) / 2, inertia, cross, outer, heavy, mass, rigid)

@@ -18,7 +18,7 @@ from scipy import linalg, sparse
 from technic.assembly.model import Assembly
 from technic.assembly.stiffness import StiffnessTable, default_table
 from technic.design.candidates import Attachment, Candidate
-from technic.design.condense import Condensed, Hold, condensed, hold_of
+from technic.design.condense import OWN, Condensed, Hold, condensed, hold_of
 from technic.design.free_motions import all_motions
 from technic.geometry import Array, shift_twist, turn_twist
 from technic.rigidity.eigen import elastic_modes
@@ -109,6 +109,7 @@ class Screen:
         # motions of one connected whole take the beam along
         self._whole = 6 if components == 1 and not assembly.supports else 0
         basis = np.column_stack([kept, pairs.vectors])
+        self._weights = np.append(np.full(basis.shape[1], self.mass), np.ones(OWN))
         self._twists = np.asarray(system.probes @ basis).reshape(len(probes), 6, -1)
 
     def forecasts(self, chosen: Sequence[Candidate]) -> list[Forecast]:
@@ -119,11 +120,16 @@ class Screen:
     def _forecast(self, candidate: Candidate) -> Forecast:
         change = self._condensed(candidate)
         field = self._field(candidate)
-        stiffness = field.T @ change.stiffness @ field
-        inertia = field.T @ change.inertia @ field
-        removed = self._removed(stiffness, field)
-        stiffness.flat[:: len(stiffness) + 1] += self.values
-        inertia.flat[:: len(inertia) + 1] += self.mass
+        count = field.shape[1]
+        size = count + OWN
+        stiffness, inertia = np.zeros((size, size)), np.zeros((size, size))
+        stiffness[:count, :count] = own = field.T @ change.stiffness @ field
+        removed = self._removed(own, field)
+        inertia[:count, :count] = field.T @ change.inertia @ field
+        # the second half is enough: the solver reads one triangle
+        inertia[count:, :count] = change.coupling @ field
+        stiffness.flat[:: size + 1] += np.concatenate([self.values, change.squares])
+        inertia.flat[:: size + 1] += self._weights
         values = linalg.eigvalsh(
             stiffness, inertia, check_finite=False, overwrite_a=True, overwrite_b=True
         )
@@ -138,8 +144,6 @@ class Screen:
 
     def _lowest(self, values: Array, removed: int, change: Condensed) -> Forecast:
         index = self.motions - removed
-        if index >= len(values):
-            return Forecast(removed, float("inf"))
         return Forecast(removed, float(values[index]) * (self.mass + change.mass))
 
     def projections(self, chosen: Sequence[Candidate]) -> list[float]:

@@ -126,9 +126,15 @@ def suggest(
     table = table_of(assembly)
     before = before or analyze(assembly, modes=1, parts=parts, table=table)
     tell("places", 0, 1)
-    found = allowed(_candidates(assembly, filters), filters)
+    every = _candidates(assembly, filters)
+    found = allowed(every, filters)
     tell("places", 1, 1)
     refused: Counter[str] = Counter()
+    if not found:
+        if filters.inventory is not None and not every:
+            every = _candidates(assembly, replace(filters, inventory=None))
+        if every:
+            refused["ruled out by what was asked for"] = len(every)
     if not found:
         return Suggestions(before, (), 0, refused, parts=parts)
     tell("forecast", 0, len(found))

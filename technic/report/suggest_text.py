@@ -139,7 +139,10 @@ def _head(answer: Suggestions, style: Style) -> list[str]:
 
 def nothing_words(answer: Suggestions) -> str:
     """Return why nothing was suggested."""
-    if not answer.places:
+    if not answer.places and answer.refused:
+        why = "; ".join(f"{n} x {reason}" for reason, n in answer.refused.most_common())
+        why = f"no place is left: {why}"
+    elif not answer.places:
         why = (
             "no two free holes, or pins that a longer one could replace, lie so that a beam would tie "
             "two parts together"
