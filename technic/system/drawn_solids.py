@@ -60,7 +60,7 @@ _EVEN: Final = (PortKind.STUD, PortKind.TUBE, PortKind.STOP)
 """Of these there are dozens on a plate, or they hold nothing: they do not count as connections."""
 
 _GROWTH: Final = 1.25
-_REMEMBERED: Final = 2048
+_REMEMBERED: Final = 1024
 
 _memory: OrderedDict[str, SuperElement | Refusal] = OrderedDict()
 

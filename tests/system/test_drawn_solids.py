@@ -357,3 +357,26 @@ def test_parts_are_built_in_parallel_and_shown():
             np.testing.assert_array_equal(made.stiffness, again.stiffness)
         else:
             assert again == made
+
+
+def die(*_: object) -> None:
+    """What a process does that the system kills for want of memory."""
+    os._exit(9)
+
+
+@pytest.mark.slow
+def test_processes_that_are_killed_leave_rigid_bodies_and_no_trace(monkeypatch):
+    parts = [
+        placed(part(ports=(stud("a", 4.0), stud("b", 16.0 + n)), number=f"x{n}"), n)
+        for n in range(6)
+    ]
+    assembly = Assembly("m", tuple(parts))
+    real = drawn_solids.build_drawn
+    monkeypatch.setattr(drawn_solids, "build_drawn", die)
+    assert prepare(assembly, jobs=2) == (6, 0)
+    models = library_models(assembly, "solid")
+    assert models.rigid_count == 6
+    assert all("for want of memory" in kind.reason for kind in models.rigid)
+    forget()  # the next run tries again
+    monkeypatch.setattr(drawn_solids, "build_drawn", real)
+    assert library_models(assembly, "solid").solid == 6
