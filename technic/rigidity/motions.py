@@ -134,19 +134,15 @@ def _ball_centers(kin: Kinematics, cluster: Cluster) -> set[tuple[float, ...]] |
 
 def _one_line(kin: Kinematics, cluster: Cluster) -> bool:
     """Tell whether all joints of the cluster share one line."""
-    joints = kin.assembly.joints
-    if any(k >= len(joints) for k in cluster.outer):
+    joints, outer = kin.assembly.joints, cluster.outer
+    if max(outer) >= len(joints):
         return False
-    first = joints[cluster.outer[0]]
+    first = joints[outer[0]]
     line = first.axes[0]
-    for k in cluster.outer[1:]:
-        other = joints[k]
-        arm = other.point - first.point
-        if np.linalg.norm(arm - (arm @ line) * line) > SAME_LINE:
-            return False
-        if abs(other.axes[0] @ line) < 1.0 - MOTION_KIND_CUT:
-            return False
-    return True
+    points = np.array([joints[k].point for k in outer]) - first.point
+    axes = np.array([joints[k].axes[0] for k in outer])
+    off = np.linalg.norm(points - (points @ line)[:, None] * line, axis=1)
+    return bool(off.max() <= SAME_LINE and np.abs(axes @ line).min() >= 1.0 - MOTION_KIND_CUT)
 
 
 def _motion(

@@ -41,10 +41,12 @@ def describe_twists(points: Array, twists: Array, length: float) -> TwistShape:
         to the bodies' middle.
     """
     middle = points.mean(axis=0)
-    moved = np.einsum("nij,nj->ni", shift_twist(middle - points), twists)
-    size = max(float(np.abs(moved[:, :3]).max()), length * float(np.abs(moved[:, 3:]).max()))
-    spread = np.abs(moved - moved[0])
-    if max(spread[:, :3].max(), length * spread[:, 3:].max()) > MOTION_KIND_CUT * size:
+    moved = twists
+    if len(points) > 1:
+        moved = np.einsum("nij,nj->ni", shift_twist(middle - points), twists)
+    weight = np.array([1.0] * 3 + [length] * 3)
+    size = float((np.abs(moved) * weight).max())
+    if len(points) > 1 and (np.abs(moved - moved[0]) * weight).max() > MOTION_KIND_CUT * size:
         return TwistShape(MotionType.GENERAL, None, None, 0.0)
     u, theta = moved[0, :3], moved[0, 3:]
     angle = float(np.linalg.norm(theta))
