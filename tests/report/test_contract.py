@@ -73,6 +73,7 @@ CONTRACT = record(
     motions=rows(
         kind={"enum": ["structural", "spinning", "sliding", "idle"]},
         order={"enum": ["finite", "first-order", None]},
+        second_order={"enum": ["stiffens", "undecided", None]},
         type={"enum": ["rotation", "translation", "screw", "general"]},
         axis={"oneOf": [{"type": "null"}, {"required": ["point", "direction"]}]},
         parts=TEXTS,
