@@ -137,7 +137,10 @@ def test_a_moved_assembly_is_written_where_it_is(seed):
     assert first.mobility.total == second.mobility.total
     assert (first.rigidity is None) == (second.rigidity is None)
     if first.rigidity is not None and second.rigidity is not None:
-        assert second.rigidity.value == pytest.approx(first.rigidity.value, rel=1e-5)
+        # places and axes are written to some 1e-10: soft modes of nearly flexible linkages feel that most
+        stiffest = first.to_dict()["spectrum_n_per_m"][-1]
+        close = pytest.approx(first.rigidity.value, rel=1e-5, abs=1e-8 * stiffest)
+        assert second.rigidity.value == close
 
 
 def test_mesh_files_are_found_again(tmp_path):
