@@ -105,6 +105,10 @@ def test_first_order_motion_is_called_shaky(scissors):
     report = dataclasses.replace(scissors, motions=(first, *scissors.motions[1:]))
     assert "Shaky: moves a little" in to_text(report)
     assert "Shaky" not in to_text(scissors)
+    for found, said in (("stiffens", "stiffens at once"), ("undecided", "does not decide")):
+        told = dataclasses.replace(first, second_order=found)
+        report = dataclasses.replace(scissors, motions=(told, *scissors.motions[1:]))
+        assert said in " ".join(to_text(report).split())
 
 
 def test_qualifier_is_said(scissors):
