@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import re
+from collections import Counter
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from technic.errors import SchemaError, UsageError
 from technic.fem.solid.inside import fill_fractions
-from technic.fem.solid.store import material_of
+from technic.fem.solid.store import ASSEMBLIES, MOST_PORTS, material_of, solid_ports, stored
 from technic.ldraw.library import Library
 from technic.ldraw.triangles import surface_of
 from technic.parts.catalogue import catalogue
@@ -116,6 +117,29 @@ def test_the_page_names_every_simplified_part_and_no_other() -> None:
     assert len(lists) == 3
     named = sorted(part for line in lists for part in line.split(", "))
     assert named == sorted(p for p in catalogue().ids() if is_approximate(definition(p)))
+
+
+def reason_without_solid_model(part: PartDefinition) -> str:
+    """Return the first words of the row of docs/shape_differences.md that explains it."""
+    frames = len(solid_ports(part))
+    if part.fastener:
+        return "fastener"
+    if part.family.startswith(ASSEMBLIES):
+        return "inner motion"
+    if frames < 2:
+        return "one frame" if frames else "no frame"
+    if frames > MOST_PORTS:
+        return "more than"
+    return "simplified form" if is_approximate(part) else "the frame"
+
+
+def test_the_page_says_why_parts_have_no_solid_model() -> None:
+    page = (HERE.parents[1] / "docs" / "shape_differences.md").read_text("utf-8")
+    missing = [part for part in catalogue().ids() if part not in stored()]
+    reasons = Counter(reason_without_solid_model(definition(part)) for part in missing)
+    for reason, count in reasons.items():
+        assert re.search(rf"^\| {reason}[^|]*\| {count} \|$", page, re.MULTILINE), (reason, count)
+    assert f"has {len(stored())} of {len(catalogue().ids())} parts" in page
 
 
 def test_only_parts_out_of_tolerance_are_listed_as_such() -> None:
