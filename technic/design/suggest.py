@@ -56,6 +56,9 @@ Rank = Literal["ritz", "paper"]
 SHORTLIST: Final = 50
 """How many of the best buildable candidates are re-analysed exactly."""
 
+MORE: Final = 4
+"""So many times the shortlist is looked at when it holds fewer different suggestions than were asked for."""
+
 _TWIN: Final = 5e-3
 """Candidates of one part number whose rigidities differ by less than this share are twins: mirror
 images of each other in a model that is not quite symmetric."""
@@ -149,7 +152,7 @@ def suggest(
     places: list[_Place] = []
     with single_thread():
         for k in _order(screen, found, forecasts, rank):
-            if len(places) == wanted:
+            if len(places) >= wanted and _enough(places, wanted, count):
                 break
             change = change_of(assembly, found[k], color=color)
             fits = fit(surroundings, found[k], change)
@@ -158,7 +161,7 @@ def suggest(
                 continue
             exact = model.exact(change)
             places.append(_Place(found[k], change, forecasts[k], exact, fits.sides))
-            tell("re-analyse", len(places), wanted)
+            tell("re-analyse", len(places), max(wanted, len(places)))
     proven: list[Suggestion] = []
     for place in _grouped(places):
         if len(proven) == count:
@@ -233,6 +236,11 @@ def _order(
         range(len(found)),
         key=lambda k: (-forecasts[k].removed, -float(f"{forecasts[k].rigidity:.9g}"), k),
     )
+
+
+def _enough(places: list[_Place], wanted: int, count: int) -> bool:
+    """Return whether the shortlist is as long as it should be: longer when most of it are twins."""
+    return len(places) >= MORE * wanted or len(_grouped(places)) >= count
 
 
 def _grouped(places: list[_Place]) -> list[_Place]:
