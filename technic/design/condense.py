@@ -15,7 +15,8 @@ import numpy as np
 from scipy import linalg
 
 from technic.design.apply import HIGHLIGHT, new_part
-from technic.design.candidates import Attachment, Candidate, faces, holes_of
+from technic.design.candidates import Attachment, Candidate
+from technic.design.faces import faces, holes_of
 from technic.errors import UsageError
 from technic.fem.element import Element
 from technic.geometry import Array, Pose, readonly, shift_twist, turn_twist

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from technic.design.apply import change_of, extend
-from technic.design.candidates import FRAMES, THIN, THIN_BENT, candidates, faces
+from technic.design.candidates import FRAMES, THIN, THIN_BENT, candidates
 from technic.design.collide import Surroundings
+from technic.design.faces import faces
 from technic.design.fit import fit, still_apart
 from technic.design.reanalysis import Reanalysis
 from technic.design.screen import Screen
