@@ -205,7 +205,7 @@ def member_matrices(
         raise InputError("the normal of a frame member is parallel to the member")
     z = z / size
     turn = np.kron(np.eye(2), turn_twist(np.array([x, cross(z, x), z])))
-    k, m = _own_axes(tuple(lengths.round(12).tolist()), section, material)
+    k, m = _own_axes(tuple(lengths.round(15).tolist()), section, material)
     return turn.T @ k @ turn, turn.T @ m @ turn
 
 

@@ -141,7 +141,10 @@ def test_play_never_stiffens_and_moves_nothing(seed, dimension, play):
     for row in data["joints"]:
         row["jitter"] = {"shear": play, "axial": play, "spin": 10 * play, "tilt": 10 * play}
     tight, loose = analyze(model, modes=1), analyze(build_assembly(data), modes=1)
-    assert loose.mobility == tight.mobility
+    counts = [
+        (m.structural, m.spinning, m.sliding, m.idle) for m in (tight.mobility, loose.mobility)
+    ]
+    assert counts[0] == counts[1]
     if value(tight) is not None:
         assert value(loose) < value(tight) * (1 + 1e-9)
 
