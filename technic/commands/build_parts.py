@@ -85,7 +85,7 @@ def build(
 
     from technic.errors import UsageError
     from technic.fem.solid.settings import MeshSettings
-    from technic.fem.solid.store import has_solid_model, read, shape_key, write
+    from technic.fem.solid.store import has_solid_model, read, read_shape, shape_key, write
     from technic.parts.catalogue import catalogue
     from technic.parts.shapes import is_approximate
     from technic.report.json import STDOUT, write_json
@@ -113,12 +113,14 @@ def build(
     elements, failures = _built(chosen, settings, jobs, quiet=quiet)
     target = out or _target()
     built = set(elements)
+    shapes = {part: shape_key(known[part]) for part in elements}
     if target.exists():
         for part in known:
             kept = None if part in built or part in failures else read(target, part)
             if kept is not None:
                 elements[part] = kept
-    shapes = {part: shape_key(known[part]) for part in elements}
+                # of the shape that it was made from: one that has changed since stays out of date
+                shapes[part] = read_shape(target, part)
     handle, name = tempfile.mkstemp(dir=target.parent, suffix=".zip")
     os.close(handle)
     try:

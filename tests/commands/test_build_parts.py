@@ -10,7 +10,8 @@ import pytest
 
 from technic import cli
 from technic.fem.solid.settings import MeshSettings
-from technic.fem.solid.store import read
+from technic.fem.solid.store import read, read_shape, shape_key, write
+from technic.parts.catalogue import catalogue
 
 
 def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
@@ -35,6 +36,22 @@ def test_draft_goes_to_a_file_of_its_own(
     made = read(target, "43857")
     assert made is not None
     assert made.cell == pytest.approx(1.2e-3)
+
+
+def test_parts_that_are_kept_keep_the_shape_they_were_made_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Building one part does not make another look up to date."""
+    target = tmp_path / "draft.zip"
+    assert run(monkeypatch, "43857", "--draft", "--out", target, "-q") == 0
+    made = read(target, "43857")
+    assert made is not None
+    write(target, {"43857": made}, shapes={"43857": "of another shape"})
+    assert run(monkeypatch, "32523", "--draft", "--out", target, "-q") == 0
+    assert read_shape(target, "43857") == "of another shape"
+    definition = catalogue().get("32523")
+    assert definition is not None
+    assert read_shape(target, "32523") == shape_key(definition)
 
 
 @pytest.mark.parametrize("option", [("--draft",), ("--cell", "1.0")])

@@ -37,6 +37,7 @@ __all__ = [
     "load",
     "material_of",
     "read",
+    "read_shape",
     "shape_key",
     "solid_ports",
     "stored",
@@ -327,6 +328,21 @@ def read(path: str | Path, part: str) -> SuperElement | None:
     try:
         with zipfile.ZipFile(path) as archive:
             return _unpack(archive.read(part)) if part in archive.namelist() else None
+    except (zipfile.BadZipFile, ValueError, KeyError, OSError) as fault:
+        raise InputError(f"not a file of super-elements: {fault}", path=path) from fault
+
+
+def read_shape(path: str | Path, part: str) -> str:
+    """Return the `shape_key` that a super-element in a file was built from.
+
+    Raises
+    ------
+    InputError
+        The file is not an archive of super-elements, or the part is not in it.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive, archive.open(part) as member:
+            return str(json.loads(member.readline())["shape"])
     except (zipfile.BadZipFile, ValueError, KeyError, OSError) as fault:
         raise InputError(f"not a file of super-elements: {fault}", path=path) from fault
 
