@@ -27,6 +27,7 @@ __all__ = [
     "sequence_text",
     "sure_words",
     "unseen_words",
+    "unstopped_words",
 ]
 
 _SIDES = {
@@ -155,6 +156,18 @@ def nothing_words(answer: Suggestions) -> str:
     return f"Nothing fits: {why}."
 
 
+def unstopped_words(answer: Suggestions) -> str:
+    """Say that no suggestion stops a motion of a flexible model; "" when one does, or none is there."""
+    motions = answer.before.mobility.structural
+    if not motions or any(s.report.mobility.structural < motions for s in answer.suggestions):
+        return ""
+    which = "the motion" if motions == 1 else "any of the motions"
+    return (
+        f"None of them stops {which}: they stiffen what bends once that stands still. A motion needs a "
+        "diagonal, or one more pin between the parts that move; --also frames and --snug look further."
+    )
+
+
 def unseen_words(answer: Suggestions) -> str:
     """Say what the search for collisions did not see; "" when it saw all."""
     parts = answer.before.assembly.parts
@@ -216,6 +229,8 @@ def alternatives_text(answer: Suggestions, style: Style | None = None) -> str:
         lines += ["", *style.wrap(nothing_words(answer))]
         return "\n".join(lines) + "\n"
     lines += ["", f"One part, best first (of {count(answer.places, 'place')}):"]
+    if said := unstopped_words(answer):
+        lines += style.wrap(said)
     for suggestion in answer.suggestions:
         lines += ["", *_suggestion(answer.before, suggestion, style)]
     lines += ["", *_unseen(answer, style), *style.wrap(basis_words(answer.suggestions))]

@@ -12,6 +12,7 @@ import pytest
 from technic import cli
 from technic.ldraw.reader import load_ldraw
 from technic.rigidity.analyze import analyze
+from tests.conftest import REPO
 from tests.design.made import ALONG_Z, SQUARE, text_of
 
 
@@ -151,6 +152,17 @@ def test_wrong_use_is_explained(run, square, arguments, said, tmp_path, monkeypa
     code, _, err = run("suggest", square, *arguments)
     assert code == 2
     assert said in err
+
+
+def test_suggestions_that_stop_nothing_say_so(run, square):
+    """The shipped square of 7s has no room for a diagonal; a frame ties its sides."""
+    said = "None of them stops the motion"
+    code, out, err = run("suggest", REPO / "examples" / "square.ldr", "--top", 1, "--shortlist", 5)
+    assert code == 0, err
+    assert said in out
+    code, out, err = run("suggest", square, "--top", 1, "--shortlist", 5)
+    assert code == 0, err
+    assert said not in out
 
 
 def test_filters_that_leave_nothing_say_so(run, square, tmp_path):
