@@ -40,7 +40,7 @@ def readonly(values: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
 
 def cross(a: Array, b: Array) -> Array:
     """Return ``a x b`` of vectors, (..., 3); on few vectors ten times as fast as ``numpy.cross``."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b))
     for k, m, n in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         out[..., k] = a[..., m] * b[..., n] - a[..., n] * b[..., m]
     return out

@@ -22,7 +22,7 @@ from scipy.sparse import linalg as sparse_linalg
 from technic.design.optimize.moving import Model
 from technic.design.optimize.pieces import Matrices, Members, turn_of
 from technic.fem.frame import local_mass, local_stiffness
-from technic.geometry import Array
+from technic.geometry import Array, cross
 
 __all__ = ["eigenvalue_gradients", "length_gradient", "skew_of"]
 
@@ -80,18 +80,23 @@ def eigenvalue_gradients(
         _add_members(slopes, group, nodes, full, values, matrices.mass)
     _add_trusses(slopes, model, positions, full, values, matrices.mass)
     _add_links(slopes, model, positions, full, _forces(model, matrices, values, vectors))
-    for out, total in zip(
-        slopes.vertices, zip(slopes.nodes, slopes.points, strict=True), strict=True
-    ):
-        out += model.nodes.T @ total[0] + model.geometry.link_points.T @ total[1]
+    for owners, total in ((model.nodes, slopes.nodes), (model.geometry.link_points, slopes.points)):
+        flat = np.moveaxis(total, 0, 1).reshape(owners.shape[0], 3 * k)
+        by_vertex = (owners.T @ flat).reshape(len(positions), k, 3)
+        slopes.vertices += np.moveaxis(by_vertex, 1, 0)
     return slopes.vertices
+
+
+def _add(total: Array, where: Any, slope: Array) -> None:
+    """Add derivatives (k, m, 3) at places (m,) of a total (k, n, 3); places may come up again."""
+    everywhere: Any = slice(None)
+    np.add.at(total, (everywhere, where), slope)
 
 
 def _spread(total: Array, first: Any, last: Any, slope: Array) -> None:
     """Add derivatives by spans (k, m, 3) to both of their ends."""
-    for out, one in zip(total, slope, strict=True):
-        np.add.at(out, last, one)
-        np.add.at(out, first, -one)
+    _add(total, last, slope)
+    _add(total, first, -slope)
 
 
 def _add_members(
@@ -181,11 +186,10 @@ def _add_links(slopes: _Slopes, model: Model, positions: Array, full: Array, for
         arm = at[s.link] - nodes[s.owner]
         _add_arms(slopes, s.link, s.sign, push, own[:, 3:])
         turned = _cross(own[:, 3:], arm[:, :, None])
-        for k in range(modes):
-            both = np.concatenate([own[:, :3, k] + turned[:, :, k], own[:, 3:, k]], axis=1)
-            np.add.at(relative[:, :, k], s.link, s.sign[:, None] * both)
-            slope = -2.0 * s.sign[:, None] * np.cross(push[s.link, :, k], own[:, 3:, k])
-            np.add.at(slopes.nodes[k], s.owner, slope)
+        both = np.concatenate([own[:, :3] + turned, own[:, 3:]], axis=1)
+        np.add.at(relative, s.link, s.sign[:, None, None] * both)
+        slope = -2.0 * s.sign[:, None, None] * _cross(push[s.link], own[:, 3:])
+        _add(slopes.nodes, s.owner, np.moveaxis(slope, 2, 0))
     s = model.truss_sides
     if len(s.link):
         bars = model.trusses
@@ -203,16 +207,17 @@ def _add_links(slopes: _Slopes, model: Model, positions: Array, full: Array, for
             probe = spans.astype(complex)
             probe[:, c] += 1j * STEP
             changes.append(np.einsum("sij,sjk->sik", model.truss_turn(probe).imag / STEP, own))
-        for k in range(modes):
-            both = np.concatenate([place[:, :, k] + turned[:, :, k], turn[:, :, k]], axis=1)
-            np.add.at(relative[:, :, k], s.link, s.sign[:, None] * both)
-            pull = -2.0 * s.sign[:, None] * np.cross(push[s.link, :, k], turn[:, :, k])
-            np.add.at(slopes.vertices[k], first, (1.0 - s.share)[:, None] * pull)
-            np.add.at(slopes.vertices[k], last, s.share[:, None] * pull)
-            by_span = np.stack([np.sum(moment[:, :, k] * d[:, :, k], axis=1) for d in changes], 1)
-            by_span = 2.0 * s.sign[:, None] * by_span
-            np.add.at(slopes.vertices[k], last, by_span)
-            np.add.at(slopes.vertices[k], first, -by_span)
+        both = np.concatenate([place + turned, turn], axis=1)
+        np.add.at(relative, s.link, s.sign[:, None, None] * both)
+        pull = -2.0 * s.sign[:, None, None] * _cross(push[s.link], turn)
+        by_span = np.stack([np.sum(moment * d, axis=1) for d in changes], axis=1)
+        by_span = 2.0 * s.sign[:, None, None] * by_span
+        share = s.share[:, None, None]
+        for vertex, slope in (
+            (first, (1.0 - share) * pull - by_span),
+            (last, share * pull + by_span),
+        ):
+            _add(slopes.vertices, vertex, np.moveaxis(slope, 2, 0))
     for link, sign, number, _, own_slice in model.still_sides:
         motion = model.maps[number] @ full[own_slice]
         arm = at[link] - model.origins[number]
@@ -234,14 +239,13 @@ def _add_links(slopes: _Slopes, model: Model, positions: Array, full: Array, for
 
 def _cross(a: Array, b: Array) -> Array:
     """Return the cross product along the second axis."""
-    return np.cross(a, np.broadcast_to(b, np.broadcast_shapes(a.shape, b.shape)), axis=1)
+    return np.moveaxis(cross(np.moveaxis(a, 1, -1), np.moveaxis(b, 1, -1)), -1, 1)
 
 
 def _add_arms(slopes: _Slopes, link: Any, sign: Array, push: Array, turn: Array) -> None:
     """Add the derivative by the links' points: ``2 F . (theta x d arm) = 2 (F x theta) . d arm``."""
-    for k in range(push.shape[2]):
-        slope = 2.0 * sign[:, None] * np.cross(push[link, :, k], turn[:, :, k])
-        np.add.at(slopes.points[k], link, slope)
+    slope = 2.0 * sign[:, None, None] * _cross(push[link], turn)
+    _add(slopes.points, link, np.moveaxis(slope, 2, 0))
 
 
 def length_gradient(positions: Array, stretches: NDArray[np.int64]) -> tuple[Array, Array]:

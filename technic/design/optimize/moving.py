@@ -318,14 +318,18 @@ class Model:
             stiff.append((k, bars.dofs))
             heavy.append((m, bars.dofs))
         rows = self.joint_rows(positions)
-        soft = rows[self.elastic]
-        joints = soft.T @ sparse.diags_array(self.springs[self.elastic]) @ soft
-        stiffness = add_blocks(stiff, self.size) + self.still_stiffness + joints
-        measure = (add_blocks(heavy, self.size) + self.still_mass) / mass
+        soft = rows if self.elastic.all() else rows[self.elastic]
+        weighted = soft.copy()
+        weighted.data *= np.repeat(self.springs[self.elastic], np.diff(soft.indptr))
+        stiffness = add_blocks(stiff, self.size) + soft.T.tocsr() @ weighted
+        measure = add_blocks(heavy, self.size)
+        if self.still_stiffness.nnz or self.still_mass.nnz:
+            stiffness, measure = stiffness + self.still_stiffness, measure + self.still_mass
+        measure.data /= mass
         return Matrices(
-            sparse.csr_array(stiffness),
-            sparse.csr_array(measure),
-            sparse.csr_array(rows[~self.elastic]),
+            stiffness,
+            measure,
+            rows[~self.elastic],
             rows,
             mass,
         )

@@ -128,6 +128,8 @@ class Objective:
         Scales: N/m and m.
     sharpness : float
     tracker : Tracker
+    lines : (e,) ndarray or None
+        kg per metre of every stretch, kept once computed.
     """
 
     model: Model
@@ -138,6 +140,7 @@ class Objective:
     start_edges: float
     sharpness: float = 20.0
     tracker: Tracker = field(default_factory=lambda: Tracker(CLUSTER))
+    lines: Array | None = None
 
     def at(self, positions: Array) -> Point:
         """Return value and derivative at some positions."""
@@ -178,7 +181,9 @@ class Objective:
     def mass(self, positions: Array) -> float:
         """Return the mass (kg)."""
         lengths, _ = length_gradient(positions, self.model.geometry.stretches)
-        return float(self.model.still_kg + lengths @ self.line_masses())
+        if self.lines is None:
+            self.lines = self.line_masses()
+        return float(self.model.still_kg + lengths @ self.lines)
 
     def line_masses(self) -> Array:
         """Return kg per metre of every stretch."""

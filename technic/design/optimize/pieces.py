@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from technic.geometry import Array
+from technic.geometry import Array, cross
 from technic.parts.definition import Material, Section
 
 __all__ = [
@@ -102,7 +102,7 @@ def turn_of(spans: Array, normals: Array) -> Array:
     x = spans / np.sqrt(np.sum(spans * spans, axis=1))[:, None]
     z = normals - np.sum(normals * x, axis=1)[:, None] * x
     z = z / np.sqrt(np.sum(z * z, axis=1))[:, None]
-    return np.stack([x, np.cross(z, x), z], axis=1)
+    return np.stack([x, cross(z, x), z], axis=1)
 
 
 def sides_of(rows: list[Any], width: int) -> Sides:
