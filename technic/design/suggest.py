@@ -152,8 +152,11 @@ def suggest(
     places: list[_Place] = []
     with single_thread():
         for k in _order(screen, found, forecasts, rank):
-            if len(places) >= wanted and _enough(places, wanted, count):
-                break
+            if len(places) >= wanted:
+                if _enough(places, wanted, count):
+                    break
+                if any(_forecast_alike(found[k], forecasts[k], place) for place in places):
+                    continue  # one more twin says nothing new
             change = change_of(assembly, found[k], color=color)
             fits = fit(surroundings, found[k], change)
             if not fits:
@@ -258,15 +261,26 @@ def _grouped(places: list[_Place]) -> list[_Place]:
 
 
 def _alike(a: _Place, b: _Place) -> bool:
-    kinds_a, kinds_b = (
-        sorted(x.fastening.kind for x in place.candidate.attachments) for place in (a, b)
-    )
     return (
-        a.candidate.number == b.candidate.number
-        and kinds_a == kinds_b
+        _same_parts(a.candidate, b.candidate)
         and a.exact.removed == b.exact.removed
         and abs(a.exact.rigidity - b.exact.rigidity) <= _TWIN * a.exact.rigidity
     )
+
+
+def _forecast_alike(candidate: Candidate, forecast: Forecast, place: _Place) -> bool:
+    """Return whether a candidate promises to be a twin of a place, as far as the forecasts tell."""
+    return (
+        _same_parts(candidate, place.candidate)
+        and forecast.removed == place.forecast.removed
+        and abs(forecast.rigidity - place.forecast.rigidity) <= _TWIN * forecast.rigidity
+    )
+
+
+def _same_parts(a: Candidate, b: Candidate) -> bool:
+    """Return whether two candidates are the same part, fastened in the same ways."""
+    kinds_a, kinds_b = (sorted(x.fastening.kind for x in own.attachments) for own in (a, b))
+    return a.number == b.number and kinds_a == kinds_b
 
 
 def _prove(

@@ -84,9 +84,11 @@ def _by_title(part: Part) -> tuple[Toothing, ...]:
     title = part.definition.title.lower().lstrip("~=_| ").removeprefix("technic ")
     match = _TEETH.match(title)
     knob = title.startswith("gear 4 knob") and "45" not in title
+    if match is None and not knob:
+        return ()
     middle = part.mass_properties.centroid
     bore = _bore(part.ports, middle)
-    if bore is None or (match is None and not knob):
+    if bore is None:
         return ()
     center = bore.position + float((middle - bore.position) @ bore.axis) * bore.axis
     if match is None:
