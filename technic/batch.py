@@ -74,9 +74,7 @@ def find_models(places: Sequence[Path]) -> list[Path]:
     found: dict[Path, None] = {}
     for place in places:
         if place.is_dir():
-            for path in sorted(place.rglob("*")):
-                if path.is_file() and _is_model(path):
-                    found[path] = None
+            found |= dict.fromkeys(path for path in _files(place, set()) if _is_model(path))
         elif place.exists():
             found[place] = None
         else:
@@ -88,6 +86,23 @@ def find_models(places: Sequence[Path]) -> list[Path]:
             remedy="Name model files (.ldr, .mpd, .io, .json) or directories that contain some.",
         )
     return list(found)
+
+
+def _files(folder: Path, seen: set[Path]) -> Iterator[Path]:
+    """Yield the files below a folder in order; links to folders are followed, each folder once."""
+    real = folder.resolve()
+    if real in seen:
+        return
+    seen.add(real)
+    try:
+        inside = sorted(folder.iterdir())
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", path=folder) from error
+    for path in inside:
+        if path.is_dir():
+            yield from _files(path, seen)
+        elif path.is_file():
+            yield path
 
 
 def _is_model(path: Path) -> bool:

@@ -50,12 +50,27 @@ def test_directories_are_searched_and_files_listed_once(tmp_path: Path) -> None:
         (inner / name).write_text("0\n")
     (inner / "other.json").write_text("{}")
     (inner / "linkage.json").write_text(json.dumps({"schema": "technic-assembly/1"}))
+    (tmp_path / "again").symlink_to(tmp_path)  # a circle
     found = find_models([inner / "b.ldr", tmp_path])
     assert [path.name for path in found] == ["b.ldr", "a.MPD", "linkage.json"]
+    (tmp_path / "linked").mkdir()
+    (tmp_path / "linked" / "here").symlink_to(inner)
+    assert len(find_models([tmp_path / "linked"])) == 3
     with pytest.raises(InputError, match="no model in it"):
         find_models([_empty(tmp_path)])
     with pytest.raises(InputError, match="no such file"):
         find_models([tmp_path / "nowhere"])
+
+
+def test_a_folder_that_cannot_be_read_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_folder: Path) -> list[Path]:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "iterdir", refuse)
+    with pytest.raises(InputError, match="cannot be read: Permission denied"):
+        find_models([tmp_path])
 
 
 def _empty(folder: Path) -> Path:
