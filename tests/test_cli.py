@@ -11,7 +11,6 @@ import sys
 import pytest
 
 import technic
-from technic import cli
 from technic.report import render
 
 BEAM = "1 4 0 {y} 0 1 0 0 0 1 0 0 0 1 32316.dat"
@@ -34,23 +33,6 @@ def scissors(tmp_path):
     lines = [BEAM.format(y=0), BEAM.format(y=-20), PIN.format(z=40)]
     path.write_text("\n".join(["0 Scissors", *lines, ""]))
     return path
-
-
-@pytest.fixture
-def run(monkeypatch, capsys):
-    """Run the program in this process: exit code, standard output, standard error."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["technic", *map(str, arguments)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as end:
-            code = int(end.code or 0)
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return call
 
 
 # --- what is said -----------------------------------------------------------------------------

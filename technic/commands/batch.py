@@ -79,7 +79,7 @@ def batch(
             check_writable(target)
     paths = find_models(models)
     outcomes: list[Outcome] = []
-    with progress_bar() as tell:
+    with progress_bar(shown=not quiet) as tell:
         tell("models", 0, len(paths))
         for outcome in analyze_many(
             paths,

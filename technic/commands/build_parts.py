@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -41,13 +40,12 @@ def _built(
 
     done = 0
     lines = not quiet and not sys.stderr.isatty()
-    with nullcontext(None) if quiet else progress_bar() as tell:
+    with progress_bar(shown=not quiet) as tell:
 
         def progress(part: str, failure: str | None) -> None:
             nonlocal done
             done += 1
-            if tell is not None:
-                tell("meshing", done, len(chosen))
+            tell("meshing", done, len(chosen))
             if lines:
                 said = "" if failure is None else f": {failure}"
                 typer.echo(f"{done}/{len(chosen)} {part}{said}", err=True)

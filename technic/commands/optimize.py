@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from technic.commands.options import AS_FOUND, JsonOption, PictureOption, QuietOption
+from technic.commands.progress import progress_bar
 from technic.commands.reading import reading
 
 if TYPE_CHECKING:
@@ -118,7 +118,11 @@ def optimize(
     if list_vertices:
         typer.echo(vertex_list(find_geometry(model, names), model.dimension))
         return
-    with _bar(max_evaluations, shown=not quiet and sys.stderr.isatty()) as progress:
+    with progress_bar(shown=not quiet) as tell:
+
+        def progress(step: Step) -> None:
+            tell("search", step.evaluation, max_evaluations, f"{step.rigidity:.4g} N/m")
+
         found = solve(
             model,
             rules=rules,
@@ -191,23 +195,3 @@ def _draw(found: Optimization, picture: Path) -> None:
     with closing(Painter()) as painter:
         reports = [analyze(found.before), analyze(found.after)]
         painter.draw(comparison_scene(reports, ("before", "after")), picture)
-
-
-@contextmanager
-def _bar(most: int, *, shown: bool) -> Iterator[Callable[[Step], None] | None]:
-    """Show a progress bar with the rigidity so far; yields what it is told the progress with."""
-    if not shown:
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("search", total=most)
-
-        def tell(step: Step) -> None:
-            said = f"evaluation {step.evaluation}: {step.rigidity:.4g} N/m"
-            bar.update(task, completed=step.evaluation, description=said)
-
-        yield tell

@@ -23,7 +23,7 @@ from technic.commands.options import (
 from technic.commands.progress import progress_bar
 from technic.commands.reading import model_options, reading
 from technic.commands.solids import make_solids
-from technic.commands.suggest_bars import BarWishes, suggest_for_linkage
+from technic.commands.suggest_bars import BarWishes, box_in, parts_between, suggest_for_linkage
 from technic.errors import MissingDependency, UsageError
 
 if TYPE_CHECKING:
@@ -56,16 +56,6 @@ def _filters(assembly: Assembly, wishes: _Wishes) -> Filters:
     from technic.report.parts_list import read_inventory
     from technic.units import LDU, MM
 
-    between = None
-    if wishes.between is not None:
-        first, second = (find_part(assembly, text) for text in wishes.between)
-        if first == second:
-            raise UsageError("--between needs two different parts")
-        between = (first, second)
-    box = None
-    if wishes.box is not None:
-        x = [v * LDU for v in wishes.box]
-        box = ((x[0], x[1], x[2]), (x[3], x[4], x[5]))
     also = [word.strip() for word in (wishes.also or "").split(",") if word.strip()]
     if unknown := sorted(set(also) - {"thin", "frames"}):
         raise UsageError(f"--also takes thin and frames, not {unknown[0]!r}")
@@ -76,8 +66,8 @@ def _filters(assembly: Assembly, wishes: _Wishes) -> Filters:
         except OSError as error:
             raise UsageError(f"{wishes.inventory} cannot be read: {error.strerror}") from error
     return Filters(
-        between=between,
-        box=box,
+        between=parts_between(assembly, wishes.between),
+        box=box_in(wishes.box, LDU),
         lengths=_lengths(wishes.lengths),
         bent=not wishes.straight,
         thin="thin" in also,
@@ -334,7 +324,7 @@ def suggest(
     )
     filters = _filters(assembly, wishes)
     sequence = count is not None or target is not None
-    with progress_bar() as tell:
+    with progress_bar(shown=not quiet) as tell:
         if sequence:
             answers = reinforce(
                 assembly,

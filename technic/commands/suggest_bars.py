@@ -16,7 +16,10 @@ if TYPE_CHECKING:
     from technic.design.bar_answer import BarSuggestion, BarSuggestions
     from technic.design.bars import Rules
 
-__all__ = ["BarWishes", "suggest_for_linkage"]
+__all__ = ["BarWishes", "box_in", "parts_between", "suggest_for_linkage"]
+
+Point = tuple[float, float, float]
+Box = tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +27,7 @@ class BarWishes:
     """What was asked for, as it was typed."""
 
     between: tuple[str, str] | None
-    box: tuple[float, float, float, float, float, float] | None
+    box: Box | None
     shortest: float
     longest: float | None
     keep_out: tuple[str, ...]
@@ -44,21 +47,38 @@ class BarWishes:
         return self.count is not None or self.target is not None
 
 
+def parts_between(assembly: Assembly, names: tuple[str, str] | None) -> tuple[int, int] | None:
+    """Return the two parts that `--between` names.
+
+    Raises
+    ------
+    UsageError
+        They are one part, or one of them does not exist.
+    """
+    from technic.assembly.select import find_part
+
+    if names is None:
+        return None
+    first, second = (find_part(assembly, text) for text in names)
+    if first == second:
+        raise UsageError("--between needs two different parts")
+    return first, second
+
+
+def box_in(box: Box | None, unit: float) -> tuple[Point, Point] | None:
+    """Return the corners of `--box` in metres."""
+    if box is None:
+        return None
+    x = [v * unit for v in box]
+    return (x[0], x[1], x[2]), (x[3], x[4], x[5])
+
+
 def _rules(assembly: Assembly, wishes: BarWishes) -> Rules:
     from technic.assembly.select import find_part
     from technic.design.bars import Rules
     from technic.units import MM
 
-    between = None
-    if wishes.between is not None:
-        first, second = (find_part(assembly, text) for text in wishes.between)
-        if first == second:
-            raise UsageError("--between needs two different parts")
-        between = (first, second)
-    box = None
-    if wishes.box is not None:
-        x = [v * MM for v in wishes.box]
-        box = ((x[0], x[1], x[2]), (x[3], x[4], x[5]))
+    between, box = parts_between(assembly, wishes.between), box_in(wishes.box, MM)
     longest = float("inf") if wishes.longest is None else wishes.longest * MM
     keep_out = frozenset(find_part(assembly, text) for text in wishes.keep_out)
     return Rules(between, box, wishes.shortest * MM, longest, keep_out)
@@ -84,7 +104,7 @@ def suggest_for_linkage(model: Path, options: Mapping[str, Any], wishes: BarWish
 
     assembly = load(model, **options)
     rules = _rules(assembly, wishes)
-    with progress_bar() as tell:
+    with progress_bar(shown=not wishes.quiet) as tell:
         if wishes.sequence:
             answers = reinforce_bars(
                 assembly,

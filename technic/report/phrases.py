@@ -6,10 +6,10 @@ from math import inf
 from typing import Any
 
 from technic.assembly.model import FindingKind
-from technic.report.wording import part_names
+from technic.report.wording import count, number, part_names
 from technic.rigidity.result import Motion, MotionKind, RigidityReport
 
-__all__ = ["FINDING_WORDS", "merged_stiffness", "motion_words"]
+__all__ = ["FINDING_WORDS", "merged_stiffness", "motion_words", "state_words"]
 
 _SENTENCE = 320
 """Letters of a motion's sentence: in a big mechanism dozens of parts follow one another."""
@@ -80,3 +80,13 @@ def merged_stiffness(
             values.setdefault(motion, []).extend(inf if v == "rigid" else v for v in found)
         merged[key] = (total + entry["count"], values)
     return merged
+
+
+def state_words(report: RigidityReport) -> str:
+    """Return verdict, motions and rigidity in a few words: ``"flexible, 1 motion, 3230 N/m"``."""
+    said = report.verdict.value
+    if report.mobility.structural:
+        said += f", {count(report.mobility.structural, 'motion')}"
+    if report.rigidity is not None:
+        said += f", {number(report.rigidity.value)} N/m"
+    return said

@@ -9,9 +9,10 @@ from typing import Any
 from technic.assembly.model import Assembly
 from technic.design.bar_answer import BarSuggestion, BarSuggestions
 from technic.design.bars import End, Pattern
+from technic.report.phrases import state_words
 from technic.report.style import Style
 from technic.report.suggest_json import SCHEMA, confidence_dict, state_dict
-from technic.report.suggest_text import basis_words, cure_words, state_words, sure_words
+from technic.report.suggest_text import basis_words, cure_words, sure_words
 from technic.report.wording import count, joined, number
 from technic.units import MM
 

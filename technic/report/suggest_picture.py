@@ -10,12 +10,13 @@ from technic.assembly.model import Assembly, Part
 from technic.report.camera import fit, sight
 from technic.report.drawing import drawing_of
 from technic.report.palette import color_name, color_rgb
+from technic.report.phrases import state_words
 from technic.report.picture import headline, model_layers
 from technic.report.scene import Camera, LegendItem, Lines, Panel, Scene, Surface
-from technic.report.wording import count, number
+from technic.report.wording import count
 from technic.rigidity.result import RigidityReport
 
-__all__ = ["before_after_scene", "state_words"]
+__all__ = ["before_after_scene"]
 
 _PALE = 0.6
 """How far the present parts are faded beside new ones."""
@@ -66,13 +67,3 @@ def _layers(
 ) -> tuple[tuple[Surface, ...], Lines]:
     drawing = drawing_of(replace(assembly, parts=parts, joints=(), findings=(), supports=()))
     return model_layers(drawing, drawing.points, pale=pale)
-
-
-def state_words(report: RigidityReport) -> str:
-    """Return verdict, motions and rigidity in a few words."""
-    said = report.verdict.value
-    if report.mobility.structural:
-        said += f", {count(report.mobility.structural, 'motion')}"
-    if report.rigidity is not None:
-        said += f", {number(report.rigidity.value)} N/m"
-    return said

@@ -12,6 +12,7 @@ from technic.design.confidence import FACTOR, RANK_SURE
 from technic.design.filters import needs
 from technic.design.suggest import Suggestion, Suggestions
 from technic.parts.catalogue import catalogue
+from technic.report.phrases import state_words
 from technic.report.style import Style
 from technic.report.wording import count, joined, number, part_name, place, spot_words
 from technic.rigidity.result import RigidityReport, Verdict
@@ -89,15 +90,6 @@ def cure_words(before: RigidityReport, suggestion: Suggestion | BarSuggestion) -
         f"relieves weak spot {spot.rank}, {spot_words(before.assembly, spot)}: "
         f"{100 * spot.energy_share:.1f} % of the strain energy before, {100 * left_share:.1f} % after"
     )
-
-
-def state_words(report: RigidityReport) -> str:
-    said = report.verdict.value
-    if report.mobility.structural:
-        said += f", {count(report.mobility.structural, 'motion')}"
-    if report.rigidity is not None:
-        said += f", {number(report.rigidity.value)} N/m"
-    return said
 
 
 def _suggestion(before: RigidityReport, suggestion: Suggestion, style: Style) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 import tomllib
 from html.parser import HTMLParser
 
@@ -12,7 +11,6 @@ import pytest
 
 import calibration
 from calibration.rigs import shipped_rigs
-from technic import cli
 
 PAIR = """0 Pair
 1 4 0 0 0 1 0 0 0 1 0 0 0 1 32316.dat
@@ -20,23 +18,6 @@ PAIR = """0 Pair
 1 0 0 -10 40 0 1 0 1 0 0 0 0 1 2780.dat
 1 0 0 -10 20 0 1 0 1 0 0 0 0 1 2780.dat
 """
-
-
-@pytest.fixture
-def run(monkeypatch, capsys):
-    """Run the program in this process: exit code, standard output, standard error."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["technic", *map(str, arguments)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as end:
-            code = int(end.code or 0)
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return call
 
 
 @pytest.fixture

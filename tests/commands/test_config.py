@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-import sys
 
 import pytest
-
-from technic import cli
 
 PAIR = """0 Pair
 1 4 0 0 0 1 0 0 0 1 0 0 0 1 32316.dat
@@ -40,23 +37,12 @@ def table(path, name, shear=50000.0, parts="solid"):
 
 
 @pytest.fixture
-def run(monkeypatch, capsys, tmp_path):
+def run(run, monkeypatch, tmp_path):
     """Run the program with its own folder of settings: exit code, output, errors."""
     monkeypatch.setenv("TECHNIC_CONFIG", str(tmp_path / "settings"))
     (tmp_path / "models").mkdir()
     (tmp_path / "models" / "pair.ldr").write_text(PAIR)
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["technic", *map(str, arguments)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as end:
-            code = int(end.code or 0)
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return call
+    return run
 
 
 def in_force(run, model, *more):

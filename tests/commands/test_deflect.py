@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-import sys
+from functools import partial
 
 import numpy as np
 import pytest
-
-from technic import cli
 
 PAIR = """0 Pair of 5L beams, two pins
 1 4 0 0 0 1 0 0 0 1 0 0 0 1 32316.dat
@@ -44,20 +42,9 @@ def pair(tmp_path):
 
 
 @pytest.fixture
-def run(monkeypatch, capsys):
+def run(run):
     """Run `technic deflect` in this process: exit code, standard output, standard error."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["technic", "deflect", *map(str, arguments)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as end:
-            code = int(end.code or 0)
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return call
+    return partial(run, "deflect")
 
 
 def answer(run, *arguments):

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import csv
 import json
-import sys
 from xml.etree import ElementTree as ET
 
 import pytest
 
-from technic import cli
 from technic.ldraw.reader import load_ldraw
 from technic.rigidity.analyze import analyze
 from tests.conftest import REPO
@@ -21,23 +19,6 @@ def square(tmp_path):
     path = tmp_path / "square.ldr"
     path.write_text("0 Square\n" + text_of(*SQUARE, end="\n"))
     return path
-
-
-@pytest.fixture
-def run(monkeypatch, capsys):
-    """Run the program in this process: exit code, standard output, standard error."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["technic", *map(str, arguments)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as end:
-            code = int(end.code or 0)
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return call
 
 
 def test_text_says_what_where_and_what_for(run, square):

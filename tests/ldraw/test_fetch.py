@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import io
 import json
-import sys
 import threading
 import zipfile
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from technic import cli
 from technic.errors import InputError, MissingDependency, UsageError
 from technic.ldraw import fetch as fetching
 from technic.ldraw.fetch import fetch, library_target
@@ -215,21 +213,6 @@ def test_a_folder_that_cannot_be_written(server, tmp_path):
 
 
 # --- on the command line ----------------------------------------------------------------------
-@pytest.fixture
-def run(monkeypatch, capsys):
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["technic", *map(str, arguments)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as end:
-            code = int(end.code or 0)
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return call
-
-
 def test_fetch_and_cache_commands(run, server, target, monkeypatch, tmp_path):
     monkeypatch.setenv("TECHNIC_LIBRARY_URL", server.url)
     code, out, err = run("parts", "fetch")

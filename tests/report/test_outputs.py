@@ -10,26 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from technic import cli
 from technic.report import render
 from tests.conftest import REPO
-
-
-@pytest.fixture
-def run(monkeypatch, capsys):
-    """Run the program in this process: exit code, standard output, standard error."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["technic", *map(str, arguments)])
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as end:
-            code = int(end.code or 0)
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return call
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ from technic.report.files import write_bytes
 from technic.report.html.pack import Block, corners_of, extremes, pack
 from technic.report.html.page import TONES
 from technic.report.html.shell import embedded, render
-from technic.report.suggest_picture import state_words
+from technic.report.phrases import state_words
 from technic.report.suggest_text import (
     basis_words,
     cure_words,
