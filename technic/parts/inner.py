@@ -11,9 +11,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from technic.errors import SchemaError
 from technic.geometry import Array, readonly
 from technic.parts.definition import Port
+from technic.parts.tables import by_number
 from technic.units import LDU
 
 __all__ = [
@@ -133,21 +133,7 @@ def parse_inner(content: Mapping[str, Any]) -> Mapping[str, InnerPart]:
     SchemaError
         With every fault.
     """
-    faults: list[str] = []
-    found: dict[str, InnerPart] = {}
-    for n, row in enumerate(content.get("part", ()), 1):
-        try:
-            part = _part(row)
-        except (KeyError, TypeError, ValueError) as error:
-            faults.append(f"part {n}: {error!s} is missing or faulty")
-            continue
-        for number in row["ids"]:
-            if number in found:
-                faults.append(f"part {n}: {number} is given twice")
-            found[number] = part
-    if faults:
-        raise SchemaError(faults, path="inner_joints.toml")
-    return found
+    return by_number(content, _part, "inner_joints.toml")
 
 
 def _choice(row: Mapping[str, Any], key: str, allowed: tuple[str, ...]) -> str:

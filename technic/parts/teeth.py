@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from technic.errors import SchemaError
 from technic.geometry import Array, readonly
+from technic.parts.tables import by_number
 from technic.units import LDU
 
 __all__ = ["MODULE", "Toothing", "parse_teeth", "teeth_table"]
@@ -78,25 +78,15 @@ def parse_teeth(content: Mapping[str, Any]) -> Mapping[str, tuple[Toothing, ...]
     SchemaError
         With every fault.
     """
-    faults: list[str] = []
-    found: dict[str, tuple[Toothing, ...]] = {}
-    for n, row in enumerate(content.get("part", ()), 1):
-        try:
-            teeth = (
-                *(_ring(entry) for entry in row.get("ring", ())),
-                *(_rack(entry) for entry in row.get("rack", ())),
-                *(_worm(entry) for entry in row.get("worm", ())),
-            )
-        except (KeyError, TypeError, ValueError) as error:
-            faults.append(f"part {n}: {error!s} is missing or faulty")
-            continue
-        for number in row["ids"]:
-            if number in found:
-                faults.append(f"part {n}: {number} is given twice")
-            found[number] = teeth
-    if faults:
-        raise SchemaError(faults, path="teeth.toml")
-    return found
+    return by_number(content, _rows, "teeth.toml")
+
+
+def _rows(part: Mapping[str, Any]) -> tuple[Toothing, ...]:
+    return (
+        *(_ring(entry) for entry in part.get("ring", ())),
+        *(_rack(entry) for entry in part.get("rack", ())),
+        *(_worm(entry) for entry in part.get("worm", ())),
+    )
 
 
 def _ring(row: Mapping[str, Any]) -> Toothing:
